@@ -1,0 +1,1 @@
+//! Closest hits and packets of shadow rays over an `obvhs` tree.

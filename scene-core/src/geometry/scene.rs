@@ -1,0 +1,240 @@
+//! The scene: every instance flattened to world space, in one vertex and one triangle array.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::{Affine3A, Vec2, Vec3};
+use thiserror::Error;
+
+use super::{Aabb, AlphaMask, MeshError, TriangleMesh};
+
+/// What an object takes part in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ObjectFlags {
+    /// Throws shadows.
+    pub casts: bool,
+    /// Shows shadows. An object that does not receive is always lit.
+    pub receives: bool,
+    /// May move between frames: baked data must not contain it as a caster.
+    pub dynamic: bool,
+}
+
+impl Default for ObjectFlags {
+    fn default() -> Self {
+        Self { casts: true, receives: true, dynamic: false }
+    }
+}
+
+/// One instance of a mesh in the scene. Its id is its place in [`Scene::objects`].
+#[derive(Clone, Debug)]
+pub struct Object {
+    /// A name for messages and reports.
+    pub name: String,
+    /// Its triangles in [`Scene::triangles`].
+    pub triangles: Range<usize>,
+    /// Its vertices in [`Scene::positions`].
+    pub vertices: Range<usize>,
+    /// World-space bounds of its vertices.
+    pub bounds: Aabb,
+    /// What it takes part in.
+    pub flags: ObjectFlags,
+    /// Cut-out mask, by the vertices' [`Scene::uvs`].
+    pub alpha: Option<Arc<AlphaMask>>,
+}
+
+/// Why an object could not be added.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum SceneError {
+    /// The mesh is broken.
+    #[error("object '{object}': {source}")]
+    Mesh {
+        /// The object's name.
+        object: String,
+        /// The fault.
+        source: MeshError,
+    },
+    /// Indices are 32 bits wide.
+    #[error("object '{object}' would be the scene's {count}th {what}: at most {} fit", u32::MAX)]
+    TooLarge {
+        /// The object's name.
+        object: String,
+        /// Vertices or triangles there would be.
+        count: usize,
+        /// "vertex" or "triangle".
+        what: &'static str,
+    },
+}
+
+/// All geometry of a scene in world space, flattened: what techniques and ray tracer read.
+///
+/// Objects are contiguous ranges of triangles and vertices in the order they were added, so a triangle's
+/// object is found by binary search.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    positions: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    uvs: Vec<Vec2>,
+    objects: Vec<Object>,
+    bounds: Option<Aabb>,
+}
+
+impl Scene {
+    /// A scene without objects.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds `mesh` placed by `world_from_mesh` and returns the new object's id.
+    ///
+    /// # Errors
+    /// A broken mesh (by element), a position that leaves the range of f32 under the transformation, or more
+    /// vertices or triangles than 32-bit indices reach. The scene is unchanged then.
+    pub fn add(
+        &mut self,
+        mesh: &TriangleMesh,
+        world_from_mesh: Affine3A,
+        flags: ObjectFlags,
+    ) -> Result<u32, SceneError> {
+        let fault = |source| SceneError::Mesh { object: mesh.name.clone(), source };
+        mesh.validate().map_err(fault)?;
+        let first_vertex = self.positions.len();
+        let first_triangle = self.triangles.len();
+        for (count, what) in [
+            (first_vertex + mesh.positions.len(), "vertex"),
+            (first_triangle + mesh.triangles.len(), "triangle"),
+        ] {
+            if count >= u32::MAX as usize {
+                return Err(SceneError::TooLarge { object: mesh.name.clone(), count, what });
+            }
+        }
+        self.positions.extend(mesh.positions.iter().map(|&p| world_from_mesh.transform_point3(p)));
+        if let Some(vertex) = self.positions[first_vertex..].iter().position(|p| !p.is_finite()) {
+            let position = self.positions[first_vertex + vertex];
+            self.positions.truncate(first_vertex);
+            return Err(fault(MeshError::NotFinite { vertex, position }));
+        }
+        let base = first_vertex as u32;
+        self.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
+        // Texture coordinates exist for all vertices or, as in most scenes, for none.
+        if !mesh.uvs.is_empty() && mesh.alpha.is_some() {
+            self.uvs.resize(first_vertex, Vec2::ZERO);
+            self.uvs.extend_from_slice(&mesh.uvs);
+        } else if !self.uvs.is_empty() {
+            self.uvs.resize(self.positions.len(), Vec2::ZERO);
+        }
+        let bounds = Aabb::from_points(self.positions[first_vertex..].iter().copied());
+        self.bounds = Some(self.bounds().union(bounds));
+        self.objects.push(Object {
+            name: mesh.name.clone(),
+            triangles: first_triangle..self.triangles.len(),
+            vertices: first_vertex..self.positions.len(),
+            bounds,
+            flags,
+            alpha: mesh.alpha.clone().filter(|mask| !mask.is_opaque()),
+        });
+        Ok(self.objects.len() as u32 - 1)
+    }
+
+    /// Vertex positions in world space.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// Vertex indices, three a triangle.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// Texture coordinates, one a vertex; empty if no object has a mask.
+    pub fn uvs(&self) -> &[Vec2] {
+        &self.uvs
+    }
+
+    /// The objects; an object's id is its index.
+    pub fn objects(&self) -> &[Object] {
+        &self.objects
+    }
+
+    /// World-space bounds of all vertices; [`Aabb::EMPTY`] for none.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds.unwrap_or(Aabb::EMPTY)
+    }
+
+    /// The corners of a triangle in world space.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
+    #[inline]
+    pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
+        self.triangles[triangle].map(|i| self.positions[i as usize])
+    }
+
+    /// The id of the object a triangle belongs to: a binary search over the objects.
+    #[inline]
+    pub fn object_of(&self, triangle: usize) -> u32 {
+        self.objects.partition_point(|o| o.triangles.end <= triangle) as u32
+    }
+
+    /// Triangles of objects that cast shadows.
+    pub fn caster_count(&self) -> usize {
+        self.objects.iter().filter(|o| o.flags.casts).map(|o| o.triangles.len()).sum()
+    }
+
+    /// Whether any object has a cut-out mask.
+    pub fn has_alpha(&self) -> bool {
+        self.objects.iter().any(|o| o.alpha.is_some())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangle() -> TriangleMesh {
+        TriangleMesh::new("t", vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]])
+    }
+
+    #[test]
+    fn instances_are_flattened_to_world_space() {
+        let mut scene = Scene::new();
+        scene.add(&triangle(), Affine3A::IDENTITY, ObjectFlags::default()).unwrap();
+        let id = scene.add(&triangle(), Affine3A::from_translation(Vec3::Z), ObjectFlags::default()).unwrap();
+        assert_eq!(id, 1);
+        assert_eq!(scene.corners(1), [Vec3::Z, Vec3::new(1.0, 0.0, 1.0), Vec3::new(0.0, 1.0, 1.0)]);
+        assert_eq!((scene.object_of(0), scene.object_of(1)), (0, 1));
+        assert_eq!(scene.bounds(), Aabb { min: Vec3::ZERO, max: Vec3::ONE });
+    }
+
+    #[test]
+    fn empty_objects_do_not_confuse_the_search() {
+        let mut scene = Scene::new();
+        let empty = TriangleMesh::default();
+        for mesh in [&empty, &triangle(), &empty, &triangle()] {
+            scene.add(mesh, Affine3A::IDENTITY, ObjectFlags::default()).unwrap();
+        }
+        assert_eq!((scene.object_of(0), scene.object_of(1)), (1, 3));
+    }
+
+    #[test]
+    fn a_refused_object_leaves_the_scene_unchanged() {
+        let mut scene = Scene::new();
+        let huge = Affine3A::from_scale(Vec3::splat(f32::MAX));
+        let mut mesh = triangle();
+        mesh.positions[1] *= 2.0;
+        assert!(scene.add(&mesh, huge, ObjectFlags::default()).is_err());
+        assert!(scene.positions().is_empty() && scene.objects().is_empty());
+    }
+
+    #[test]
+    fn uvs_are_kept_only_for_masks_and_stay_aligned() {
+        let mut masked = triangle();
+        masked.uvs = vec![Vec2::ZERO, Vec2::X, Vec2::Y];
+        masked.alpha = AlphaMask::from_alpha(1, 1, &[0], 0.5, Default::default()).map(Arc::new);
+        let mut scene = Scene::new();
+        for mesh in [&triangle(), &masked, &triangle()] {
+            scene.add(mesh, Affine3A::IDENTITY, ObjectFlags::default()).unwrap();
+        }
+        assert_eq!(scene.uvs().len(), scene.positions().len());
+        assert_eq!(scene.uvs()[4], Vec2::X);
+    }
+}

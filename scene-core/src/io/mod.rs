@@ -1,0 +1,1 @@
+//! Loading scenes and writing images.

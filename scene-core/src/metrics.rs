@@ -1,0 +1,1 @@
+//! Errors of a visibility image against ground truth.

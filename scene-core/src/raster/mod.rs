@@ -1,0 +1,1 @@
+//! The CPU rasteriser: depth from any projection, and the G-buffer.

@@ -1,0 +1,1 @@
+//! Ray-traced ground truth, and which pixels may be compared.

@@ -1,0 +1,74 @@
+//! What a step cost and what it left out.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use serde::Serialize;
+
+/// Milliseconds per stage, bytes held, and what was skipped. Every step of a technique returns one.
+///
+/// Stages are named `prepare.*` and `shade.*`; a technique's CPU and GPU paths use the same names.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Report {
+    /// Stage name → milliseconds of wall time (on the GPU: of the GPU, where timestamps are offered).
+    pub stages_ms: BTreeMap<String, f64>,
+    /// Bytes the technique holds for this light after the step.
+    pub bytes: u64,
+    /// What was skipped → how many of it.
+    pub skipped: BTreeMap<String, u64>,
+}
+
+impl Report {
+    /// Runs `work` and books its wall time under `stage`; several runs of one stage add up.
+    pub fn time<T>(&mut self, stage: &str, work: impl FnOnce(&mut Self) -> T) -> T {
+        let start = Instant::now();
+        let result = work(self);
+        *self.stages_ms.entry(stage.to_owned()).or_default() += start.elapsed().as_secs_f64() * 1e3;
+        result
+    }
+
+    /// Books `count` skipped things. Zero is booked too: it says that skipping was tried.
+    pub fn skip(&mut self, what: &str, count: u64) {
+        *self.skipped.entry(what.to_owned()).or_default() += count;
+    }
+
+    /// Adds another step's times and skips; the larger number of bytes stands.
+    pub fn merge(&mut self, other: &Self) {
+        for (stage, ms) in &other.stages_ms {
+            *self.stages_ms.entry(stage.clone()).or_default() += ms;
+        }
+        for (what, count) in &other.skipped {
+            self.skip(what, *count);
+        }
+        self.bytes = self.bytes.max(other.bytes);
+    }
+
+    /// Milliseconds of all stages whose name starts with `prefix`.
+    pub fn total_ms(&self, prefix: &str) -> f64 {
+        self.stages_ms.iter().filter(|(stage, _)| stage.starts_with(prefix)).map(|(_, ms)| ms).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn merging_adds_times_and_skips() {
+        let mut report = Report::default();
+        assert_eq!(
+            report.time("prepare.map", |r| {
+                r.skip("faces", 2);
+                7
+            }),
+            7
+        );
+        let mut other = Report { bytes: 9, ..Default::default() };
+        other.stages_ms.insert("shade.lookup".into(), 3.0);
+        other.skip("faces", 3);
+        report.merge(&other);
+        assert_eq!(report.skipped["faces"], 5);
+        assert_eq!(report.total_ms("shade."), 3.0);
+        assert_eq!(report.bytes, 9);
+    }
+}

@@ -1,0 +1,113 @@
+//! The interface of every shadow technique: prepare, then shade.
+//!
+//! [`ShadowTechnique`] is object-safe so that the command line, tests and benchmarks can hold any of them.
+//! The algorithms themselves live on concrete types in the technique crates and can be called without it.
+
+mod capability;
+mod settings;
+
+use glam::Vec3;
+use thiserror::Error;
+
+pub use capability::{Capability, Description, Support};
+pub use settings::{Params, Preset, Setting, SettingKind, SettingsError};
+
+use crate::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
+
+/// Why a technique could not do its work.
+#[derive(Debug, Error)]
+pub enum TechniqueError {
+    /// The technique cannot answer for this input at all; see [`ShadowTechnique::describe`].
+    #[error("{technique} does not take {input}: {why}")]
+    Unsupported {
+        /// The technique's name.
+        technique: &'static str,
+        /// What it was given.
+        input: String,
+        /// The limit.
+        why: String,
+    },
+    /// Settings contradict each other or the input.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// The output buffer does not have the input's size.
+    #[error("the output holds {got} values, but the input has {expected}")]
+    OutputSize {
+        /// Values expected.
+        expected: usize,
+        /// Values given.
+        got: usize,
+    },
+    /// Anything that only one technique knows.
+    #[error(transparent)]
+    Other(#[from] Box<dyn std::error::Error + Send + Sync>),
+}
+
+/// What a technique prepares for: one light in one scene, seen by one camera.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadowQuery<'a> {
+    /// Geometry.
+    pub scene: &'a Scene,
+    /// The light whose visibility is asked for.
+    pub light: &'a Light,
+    /// The camera. Techniques whose preparation does not depend on it say so by
+    /// [`PreparedShadow::survives_camera`].
+    pub camera: &'a Camera,
+}
+
+/// A shadow algorithm with its settings.
+pub trait ShadowTechnique: Send + Sync {
+    /// The name on the command line, the crate's without its prefix.
+    fn name(&self) -> &'static str;
+
+    /// What it takes: exact, approximate or unsupported, per input.
+    fn describe(&self) -> Description;
+
+    /// All settings as they stand, by name.
+    fn settings(&self) -> serde_json::Value;
+
+    /// Does what depends on scene and light, and, for view-dependent techniques, on the camera.
+    ///
+    /// # Errors
+    /// [`TechniqueError::Unsupported`] for inputs that [`describe`](Self::describe) excludes.
+    fn prepare(&self, query: &ShadowQuery<'_>) -> Result<(Box<dyn PreparedShadow>, Report), TechniqueError>;
+}
+
+/// The outcome of [`ShadowTechnique::prepare`]: answers for any number of G-buffers and points.
+pub trait PreparedShadow: Send + Sync {
+    /// Fills `visibility` for every pixel that sees a surface; NaN elsewhere.
+    ///
+    /// # Errors
+    /// If the two images differ in size.
+    fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError>;
+
+    /// V at free points of space, world coordinates, one value a point; NaN for a point that is not finite.
+    ///
+    /// # Errors
+    /// [`TechniqueError::Unsupported`] by default, or if the slices differ in length.
+    fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Result<Report, TechniqueError>;
+
+    /// Whether the preparation still holds when only the camera moves.
+    fn survives_camera(&self) -> bool;
+}
+
+/// How the command line and tests make a technique from settings: one value per technique crate.
+pub trait TechniqueFactory: Send + Sync {
+    /// The technique's name.
+    fn name(&self) -> &'static str;
+    /// One line: what it is.
+    fn summary(&self) -> &'static str;
+    /// Every setting with unit, range and default.
+    fn settings(&self) -> &'static [Setting];
+    /// Names of the quality ladder, fastest first.
+    fn presets(&self) -> Vec<&'static str>;
+    /// A technique from a preset (or the defaults) with `overrides` (`key`, value as text) applied on top.
+    ///
+    /// # Errors
+    /// Unknown preset or key, a value of the wrong type or out of range.
+    fn create(
+        &self,
+        preset: Option<&str>,
+        overrides: &[(String, String)],
+    ) -> Result<Box<dyn ShadowTechnique>, SettingsError>;
+}
