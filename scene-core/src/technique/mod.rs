@@ -70,7 +70,10 @@ pub trait ShadowTechnique: Send + Sync {
     ///
     /// # Errors
     /// [`TechniqueError::Unsupported`] for inputs that [`describe`](Self::describe) excludes.
-    fn prepare(&self, query: &ShadowQuery<'_>) -> Result<(Box<dyn PreparedShadow>, Report), TechniqueError>;
+    fn prepare<'a>(
+        &self,
+        query: &ShadowQuery<'a>,
+    ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError>;
 
     /// The technique on a device of the caller's: makes its pipelines, records nothing yet.
     ///
