@@ -39,7 +39,7 @@ pub(super) fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// The finaliser of SplitMix64 (Steele, Lea, Flood: Fast splittable pseudorandom number generators, 2014): each
+/// The finaliser of `SplitMix64` (Steele, Lea, Flood: Fast splittable pseudorandom number generators, 2014): each
 /// bit of the input changes each bit of the output with probability one half.
 #[inline]
 fn mix(mut z: u64) -> u64 {

@@ -1,7 +1,7 @@
 //! Points of a light as a receiver sees it, so that equally many of them stand for equal shares of V.
 //!
 //! Two halves meet in the unit square. A [`LightView`] maps the square onto the light with the measure that V
-//! is defined by ([`Light`]): area for `rect` and `disk`, solid angle for `sphere` and
+//! is defined by ([`Light`](super::Light)): area for `rect` and `disk`, solid angle for `sphere` and
 //! `directional`. A pattern fills the square: [`Strata`] (jittered cells of equal area, for any number of
 //! samples) or [`sobol`] (an Owen-scrambled (0, 2)-sequence).
 //!
@@ -30,8 +30,6 @@ pub use sobol::sobol;
 pub use strata::Strata;
 pub use view::LightView;
 
-#[cfg(doc)]
-use super::Light;
 use super::LightPoint;
 
 /// Fills `points` with one jittered point from each of `points.len()` parts of the light of equal measure.
