@@ -75,7 +75,8 @@ mod tests {
 
     #[test]
     fn equal_positions_meet_at_the_first_and_zeros_are_equal() {
-        let p = [Vec3::ONE, Vec3::ZERO, Vec3::splat(-0.0), Vec3::ONE, Vec3::new(1.0, 1.0, 1.0 + f32::EPSILON)];
+        let p =
+            [Vec3::ONE, Vec3::ZERO, Vec3::splat(-0.0), Vec3::ONE, Vec3::new(1.0, 1.0, 1.0 + f32::EPSILON)];
         assert_eq!(weld(&p), Weld { representative: vec![0, 1, 1, 0, 4], unique: 3 });
     }
 
