@@ -16,6 +16,7 @@
 //! | [`reference`] | ray-traced ground truth and which pixels may be compared |
 //! | [`metrics`] | errors of a visibility image |
 //! | [`technique`] | the [`ShadowTechnique`] trait, settings, reports |
+//! | `gpu` | its GPU half, with the feature of that name |
 //!
 //! # Conventions
 //!
@@ -28,6 +29,8 @@ pub mod bvh;
 pub mod camera;
 pub mod gbuffer;
 pub mod geometry;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod io;
 pub mod light;
 pub mod metrics;

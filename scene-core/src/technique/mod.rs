@@ -70,7 +70,28 @@ pub trait ShadowTechnique: Send + Sync {
     ///
     /// # Errors
     /// [`TechniqueError::Unsupported`] for inputs that [`describe`](Self::describe) excludes.
-    fn prepare(&self, query: &ShadowQuery<'_>) -> Result<(Box<dyn PreparedShadow>, Report), TechniqueError>;
+    fn prepare<'a>(
+        &self,
+        query: &ShadowQuery<'a>,
+    ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError>;
+
+    /// The technique on a device of the caller's: makes its pipelines, records nothing yet.
+    ///
+    /// # Errors
+    /// [`TechniqueError::Unsupported`] if there is no GPU path for these settings.
+    #[cfg(feature = "gpu")]
+    fn gpu(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+    ) -> Result<Box<dyn crate::gpu::GpuShadowTechnique>, TechniqueError> {
+        let _ = (device, queue);
+        Err(TechniqueError::Unsupported {
+            technique: self.name(),
+            input: "backend = gpu".to_owned(),
+            why: "this technique has a CPU path only".to_owned(),
+        })
+    }
 }
 
 /// The outcome of [`ShadowTechnique::prepare`]: answers for any number of G-buffers and points.
