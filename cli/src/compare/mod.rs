@@ -13,13 +13,10 @@ use crate::ground_truth::GroundTruth;
 use crate::picture::error_map::error_map;
 use crate::picture::shading::Shading;
 use crate::report::RunReport;
-use crate::scene_source::View;
 use statistics::{Errors, Shares};
 
 /// All that a comparison found out.
-pub(crate) struct Comparison<'a> {
-    /// What was looked at.
-    pub(crate) view: &'a View,
+pub(crate) struct Comparison {
     /// Ground truth.
     pub(crate) truth: Truth,
     /// One for each technique that ran.
@@ -141,7 +138,7 @@ struct EntryReport<'a> {
     shares: Shares,
 }
 
-impl Comparison<'_> {
+impl Comparison {
     /// What goes into `report.json`.
     pub(crate) fn report(&self) -> ComparisonReport<'_> {
         let run = &self.truth.report;

@@ -16,7 +16,7 @@ use crate::picture;
 use crate::picture::error_map::diverging;
 
 /// Writes the page.
-pub(crate) fn page(comparison: &Comparison<'_>) -> Result<Vec<u8>, CliError> {
+pub(crate) fn page(comparison: &Comparison) -> Result<Vec<u8>, CliError> {
     let truth = &comparison.truth;
     let css = fill(include_str!("page/page.css"), &[("stops", &colour_stops())]);
     let values = [
@@ -48,7 +48,7 @@ fn colour_stops() -> String {
     (-8..=8).map(stop).collect::<Vec<_>>().join(", ")
 }
 
-fn facts(comparison: &Comparison<'_>) -> String {
+fn facts(comparison: &Comparison) -> String {
     let truth = &comparison.truth;
     let run = &truth.report;
     let soft = if run.light.extended { "" } else { ", without extent" };
@@ -90,7 +90,7 @@ fn sort_keys(row: &Row<'_>) -> [Option<f64>; COLUMNS.len() - 1] {
     keys.map(|key| key.filter(|key| !key.is_nan()))
 }
 
-fn table_body(comparison: &Comparison<'_>) -> String {
+fn table_body(comparison: &Comparison) -> String {
     /// Columns where the smallest figure is the best: the errors.
     const BEST: std::ops::Range<usize> = 2..6;
     let keys: Vec<_> = rows(comparison).map(|row| sort_keys(&row)).collect();
@@ -116,14 +116,14 @@ fn table_body(comparison: &Comparison<'_>) -> String {
     body
 }
 
-fn refused(comparison: &Comparison<'_>) -> String {
+fn refused(comparison: &Comparison) -> String {
     let item = |r: &super::Refused| format!("<li>{}: {}</li>\n", escape(&r.technique), escape(&r.why));
     let items: String = comparison.refused.iter().map(item).collect();
     if items.is_empty() { items } else { format!("<p>Not run:</p>\n<ul>\n{items}</ul>") }
 }
 
 /// A row of figures for ground truth and for each technique.
-fn gallery(comparison: &Comparison<'_>) -> Result<String, CliError> {
+fn gallery(comparison: &Comparison) -> Result<String, CliError> {
     let mut html = String::new();
     let truth = &comparison.truth;
     let none = None;

@@ -21,7 +21,7 @@ const COLUMNS: u32 = 3;
 const CELL_WIDTHS: std::ops::RangeInclusive<u32> = 256..=512;
 
 /// Draws the sheet.
-pub(crate) fn sheet(comparison: &Comparison<'_>) -> RgbImage {
+pub(crate) fn sheet(comparison: &Comparison) -> RgbImage {
     let shaded = &comparison.truth.pictures.shaded;
     let (cell_width, cell_height) = cell_size(shaded.width(), shaded.height());
     let caption = TextStyle::Strong.line_height() + 6;
@@ -60,7 +60,7 @@ fn cell_size(width: u32, height: u32) -> (u32, u32) {
     ((f64::from(width) * f64::from(tallest) / f64::from(height)).round().max(1.0) as u32, tallest)
 }
 
-fn draw_head(canvas: &mut Canvas, comparison: &Comparison<'_>, width: u32) {
+fn draw_head(canvas: &mut Canvas, comparison: &Comparison, width: u32) {
     let run = &comparison.truth.report;
     let mut y = MARGIN;
     let style = TextStyle::Title;
@@ -93,7 +93,7 @@ impl Layout {
         MARGIN + column * (self.cell_width + GAP)
     }
 
-    fn truth(&self, canvas: &mut Canvas, comparison: &Comparison<'_>, y: u32) {
+    fn truth(&self, canvas: &mut Canvas, comparison: &Comparison, y: u32) {
         let truth = &comparison.truth;
         self.caption(canvas, y, &format!("ground truth, {}", truth.report.variant));
         let top = y + self.caption;

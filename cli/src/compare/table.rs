@@ -50,7 +50,7 @@ impl<'a> CsvRow<'a> {
 }
 
 /// `table.csv`: ground truth first, then the techniques.
-pub(crate) fn csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, CliError> {
+pub(crate) fn csv(comparison: &Comparison) -> Result<Vec<u8>, CliError> {
     let encode = |source: Box<dyn std::error::Error + Send + Sync>| CliError::Encode { what: "table.csv", source };
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows(comparison) {
@@ -69,7 +69,7 @@ pub(crate) struct Row<'a> {
 }
 
 /// Ground truth first, then the techniques.
-pub(crate) fn rows<'a>(comparison: &'a Comparison<'_>) -> impl Iterator<Item = Row<'a>> {
+pub(crate) fn rows<'a>(comparison: &'a Comparison) -> impl Iterator<Item = Row<'a>> {
     let truth = &comparison.truth;
     let first = Row { label: "ground truth", report: &truth.report, errors: None, shares: truth.shares };
     std::iter::once(first).chain(comparison.entries.iter().map(|entry| Row {
@@ -128,7 +128,7 @@ pub(crate) fn milliseconds(ms: f64) -> String {
 }
 
 /// The table for a terminal.
-pub(crate) fn text(comparison: &Comparison<'_>) -> String {
+pub(crate) fn text(comparison: &Comparison) -> String {
     let mut lines = vec![COLUMNS.map(|(heading, _)| heading.to_owned())];
     lines.extend(rows(comparison).map(|row| cells(&row)));
     aligned(&lines)

@@ -90,7 +90,7 @@ impl Canvas {
                 continue;
             };
             let left = x + i as u32 * advance;
-            for (dy, row) in glyph.raster().iter().enumerate() {
+            for (dy, row) in glyph.rows().enumerate() {
                 for (dx, &coverage) in row.iter().enumerate() {
                     self.blend(left + dx as u32, y + dy as u32, colour, coverage);
                 }

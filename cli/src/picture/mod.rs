@@ -8,6 +8,8 @@ pub(crate) mod shading;
 use image::{DynamicImage, GrayAlphaImage, LumaA};
 use scene_core::VisibilityImage;
 
+use crate::error::CliError;
+
 /// Visibility as grey, 0 black and 255 fully lit, linear in V; transparent where nothing is seen.
 pub(crate) fn grey(visibility: &VisibilityImage) -> GrayAlphaImage {
     GrayAlphaImage::from_fn(visibility.width, visibility.height, |x, y| {
@@ -18,9 +20,12 @@ pub(crate) fn grey(visibility: &VisibilityImage) -> GrayAlphaImage {
 
 /// A PNG file of the image. Encoding into memory cannot fail but for want of memory or an image without
 /// pixels, which a camera never has.
-pub(crate) fn png(image: impl Into<DynamicImage>) -> Result<Vec<u8>, image::ImageError> {
+pub(crate) fn png(image: impl Into<DynamicImage>) -> Result<Vec<u8>, CliError> {
     let mut bytes = std::io::Cursor::new(Vec::new());
-    image.into().write_to(&mut bytes, image::ImageFormat::Png)?;
+    image
+        .into()
+        .write_to(&mut bytes, image::ImageFormat::Png)
+        .map_err(|error| CliError::Encode { what: "a PNG", source: error.into() })?;
     Ok(bytes.into_inner())
 }
 
