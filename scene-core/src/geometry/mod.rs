@@ -2,10 +2,16 @@
 
 mod aabb;
 mod alpha;
+mod facing;
 mod mesh;
 mod scene;
+mod topology;
+mod weld;
 
 pub use aabb::Aabb;
 pub use alpha::{AlphaMask, Wrap};
+pub use facing::{facing, facing_of};
 pub use mesh::{MeshError, TriangleMesh};
 pub use scene::{Object, ObjectFlags, Scene, SceneError};
+pub use topology::{EdgeStatistics, EdgeTopology, Incidence, SilhouetteEdge, TopologyError};
+pub use weld::{Weld, weld};

@@ -1,5 +1,7 @@
 //! Light kinds: what a point can see of each, and how to sample that.
 
+pub mod sampling;
+
 use glam::Vec3;
 use thiserror::Error;
 
