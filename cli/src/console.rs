@@ -46,6 +46,14 @@ impl Console {
         Working(bar)
     }
 
+    /// Shows how much of `what` is done until the returned value is dropped.
+    pub(crate) fn progress(&self, what: impl Into<String>) -> Progress {
+        let bar = self.bar(ProgressBar::new(Progress::STEPS));
+        bar.set_style(style("{bar:30} {percent:>3} % {msg} {elapsed}, {eta} left"));
+        bar.set_message(what.into());
+        Progress(bar)
+    }
+
     fn bar(&self, bar: ProgressBar) -> ProgressBar {
         bar.set_draw_target(if self.progress { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() });
         bar
@@ -61,6 +69,28 @@ fn style(template: &str) -> ProgressStyle {
 pub(crate) struct Working(ProgressBar);
 
 impl Drop for Working {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// A progress bar that goes away when dropped.
+#[derive(Debug)]
+pub(crate) struct Progress(ProgressBar);
+
+impl Progress {
+    const STEPS: u64 = 1000;
+
+    /// Shows the share done, in [0, 1]. May be called from any thread and out of order: the bar never goes back.
+    pub(crate) fn set(&self, fraction: f32) {
+        let position = (fraction.clamp(0.0, 1.0) * Self::STEPS as f32) as u64;
+        if position > self.0.position() {
+            self.0.set_position(position);
+        }
+    }
+}
+
+impl Drop for Progress {
     fn drop(&mut self) {
         self.0.finish_and_clear();
     }

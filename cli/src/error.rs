@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use scene_core::camera::CameraError;
+use scene_core::metrics::MetricsError;
 use scene_core::technique::{SettingsError, TechniqueError};
 use thiserror::Error;
 
@@ -47,6 +48,10 @@ pub(crate) enum CliError {
     Technique(#[from] TechniqueError),
     #[error("--backend gpu: {technique} has no GPU path in this build; take --backend cpu or auto")]
     NoGpu { technique: &'static str },
+    #[error("the technique's image cannot be compared with ground truth")]
+    Metrics(#[from] MetricsError),
+    #[error("cancelled")]
+    Cancelled,
     #[error("cannot start the threads: {0}")]
     Threads(String),
     #[error("cannot encode {what}")]

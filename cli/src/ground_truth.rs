@@ -1,9 +1,10 @@
 //! Ground truth of a view: the one place that asks the ray tracer.
 
+use std::ops::ControlFlow;
 use std::time::Instant;
 
 use scene_core::bvh::Bvh;
-use scene_core::reference::{ReferenceOptions, reference, valid_pixels};
+use scene_core::reference::{Cancelled, ReferenceSettings, reference, valid_pixels};
 use scene_core::{GBuffer, Report, VisibilityImage};
 use serde_json::json;
 
@@ -31,7 +32,7 @@ impl GroundTruth {
     }
 }
 
-/// Traces ground truth and books what it cost as if it were a technique.
+/// Traces ground truth and books what it cost as if it were a technique: the BVH is its preparation.
 pub(crate) fn trace(
     view: &View,
     gbuffer: &GBuffer,
@@ -39,19 +40,26 @@ pub(crate) fn trace(
     seed: u64,
     console: &Console,
 ) -> Result<(GroundTruth, RunReport), CliError> {
-    let _working = console.working(format!("ground truth, {}", count_of(args.samples as usize, "sample")));
+    let bar = console.progress(format!("ground truth, {}", count_of(args.samples as usize, "sample")));
+    let progress = |fraction: f32| {
+        bar.set(fraction);
+        ControlFlow::Continue(())
+    };
+    let settings = ReferenceSettings { samples: args.samples, seed };
+    let (scene, light) = (&view.setup.scene, view.light());
     let mut report = Report::default();
     let start = Instant::now();
-    let bvh = report.time("prepare.bvh", |_| Bvh::casters(&view.setup.scene));
+    let bvh = report.time("prepare.bvh", |_| Bvh::casters(scene));
     let prepare_ms = milliseconds_since(start);
     let start = Instant::now();
-    let options = ReferenceOptions { samples: args.samples, seed };
-    let traced = report.time("shade.rays", |_| reference(&view.setup.scene, &bvh, gbuffer, view.light(), &options));
+    let traced = report
+        .time("shade.rays", |_| reference(scene, &bvh, light, gbuffer, &settings, &progress))
+        .map_err(|Cancelled| CliError::Cancelled)?;
     let shade_ms = milliseconds_since(start);
     let truth = GroundTruth {
         visibility: traced.visibility,
         std_error: traced.std_error,
-        valid: valid_pixels(gbuffer, view.light()),
+        valid: valid_pixels(gbuffer, light),
     };
     let subject = Subject {
         technique: "reference".to_owned(),
@@ -59,4 +67,21 @@ pub(crate) fn trace(
         settings: json!({ "samples": args.samples, "seed": seed }),
     };
     Ok((truth, RunReport::cpu(view, subject, prepare_ms, shade_ms, report)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_that_of_valid_pixels() {
+        let mut truth = GroundTruth {
+            visibility: VisibilityImage::new(4, 1),
+            std_error: vec![0.3, 0.4, 9.0, f32::NAN],
+            valid: vec![true, true, false, false],
+        };
+        assert!((truth.noise() - 0.125f64.sqrt()).abs() < 1e-6);
+        truth.valid = vec![false; 4];
+        assert!(truth.noise().is_nan());
+    }
 }

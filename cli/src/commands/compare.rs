@@ -28,12 +28,12 @@ pub(crate) fn run(args: &CompareArgs, console: &Console) -> Result<(), CliError>
         console.note("note: no pixel can be compared: none sees a surface with the whole light above it");
     }
     let shading = Shading::new(&gbuffer, &view.setup.camera, view.light());
-    let truth_row = Truth::new(&truth, truth_report, &shading);
+    let truth_row = Truth::new(&truth, truth_report, &shading)?;
     let (mut entries, mut refused) = (Vec::new(), Vec::new());
     for chosen in chosen {
         let _working = console.working(chosen.label.clone());
         match measure::fastest(chosen.technique.as_ref(), &view, &gbuffer) {
-            Ok(run) => entries.push(Entry::new(chosen.label, run, &truth, &shading, args.error_scale)),
+            Ok(run) => entries.push(Entry::new(chosen.label, run, &truth, &shading, args.error_scale)?),
             Err(CliError::Technique(TechniqueError::Unsupported { input, why, .. })) => {
                 refused.push(Refused { technique: chosen.label, why: format!("it does not take {input}: {why}") });
             }

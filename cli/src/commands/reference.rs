@@ -1,10 +1,10 @@
 //! `gnomon reference`: ground truth.
 
+use scene_core::metrics;
 use scene_core::raster::render_gbuffer;
 
 use crate::args::ReferenceArgs;
 use crate::compare::percent;
-use crate::compare::statistics::Shares;
 use crate::compare::table::{error_text, milliseconds};
 use crate::console::Console;
 use crate::error::CliError;
@@ -32,7 +32,7 @@ pub(crate) fn run(args: &ReferenceArgs, console: &Console) -> Result<(), CliErro
         ];
         out.write(&files)?;
     }
-    let shares = Shares::new(&truth.visibility, &truth.valid);
+    let shares = metrics::shares(&truth.visibility, &truth.valid)?;
     let text = format!(
         "{}: {} ms, standard error {}; lit {}, penumbra {}, umbra {}\n",
         out.path().display(),

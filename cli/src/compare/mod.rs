@@ -3,17 +3,16 @@
 pub(crate) mod html;
 pub(crate) mod page;
 pub(crate) mod sheet;
-pub(crate) mod statistics;
 pub(crate) mod table;
 
 use image::RgbImage;
+use scene_core::metrics::{self, Errors, MetricsError, Shares};
 use serde::Serialize;
 
 use crate::ground_truth::GroundTruth;
 use crate::picture::error_map::error_map;
 use crate::picture::shading::Shading;
 use crate::report::RunReport;
-use statistics::{Errors, Shares};
 
 /// All that a comparison found out.
 pub(crate) struct Comparison {
@@ -35,7 +34,8 @@ pub(crate) struct Truth {
     pub(crate) seen: usize,
     /// Pixels that are compared.
     pub(crate) valid: usize,
-    /// Root mean square of the standard error over valid pixels: errors below it are noise of the truth.
+    /// Root mean square of the standard error over valid pixels: errors below it are noise of the truth. NaN for
+    /// no valid pixel.
     pub(crate) noise: f64,
     pub(crate) pictures: Pictures,
 }
@@ -46,7 +46,8 @@ pub(crate) struct Entry {
     pub(crate) label: String,
     pub(crate) report: RunReport,
     pub(crate) errors: Errors,
-    pub(crate) shares: Shares,
+    /// None if a valid pixel was left without a value.
+    pub(crate) shares: Option<Shares>,
     pub(crate) pictures: Pictures,
     pub(crate) error_map: RgbImage,
 }
@@ -73,15 +74,19 @@ impl Pictures {
 
 impl Truth {
     /// Ground truth as the first row of every table.
-    pub(crate) fn new(truth: &GroundTruth, report: RunReport, shading: &Shading) -> Self {
-        Self {
+    pub(crate) fn new(
+        truth: &GroundTruth,
+        report: RunReport,
+        shading: &Shading,
+    ) -> Result<Self, MetricsError> {
+        Ok(Self {
             report,
-            shares: Shares::new(&truth.visibility, &truth.valid),
+            shares: metrics::shares(&truth.visibility, &truth.valid)?,
             seen: truth.visibility.values.iter().filter(|v| !v.is_nan()).count(),
             valid: truth.valid.iter().filter(|&&valid| valid).count(),
             noise: truth.noise(),
             pictures: Pictures::new(shading, &truth.visibility),
-        }
+        })
     }
 }
 
@@ -93,15 +98,16 @@ impl Entry {
         truth: &GroundTruth,
         shading: &Shading,
         error_scale: f32,
-    ) -> Self {
-        Self {
+    ) -> Result<Self, MetricsError> {
+        let signed = metrics::signed_error(&run.visibility, &truth.visibility, &truth.valid)?;
+        Ok(Self {
             label,
-            errors: Errors::new(&run.visibility, truth),
-            shares: Shares::new(&run.visibility, &truth.valid),
+            errors: metrics::errors(&run.visibility, &truth.visibility, &truth.valid)?,
+            shares: metrics::shares(&run.visibility, &truth.valid).ok(),
             pictures: Pictures::new(shading, &run.visibility),
-            error_map: error_map(&run.visibility, &truth.visibility, &truth.valid, error_scale),
+            error_map: error_map(&signed, &truth.visibility, error_scale),
             report: run.report,
-        }
+        })
     }
 }
 
@@ -135,7 +141,7 @@ struct EntryReport<'a> {
     #[serde(flatten)]
     run: &'a RunReport,
     errors: Errors,
-    shares: Shares,
+    shares: Option<Shares>,
 }
 
 impl Comparison {
@@ -183,9 +189,9 @@ impl Comparison {
     }
 }
 
-/// A share as a percentage; a dash for none.
+/// A share as a percentage.
 pub(crate) fn percent(share: f64) -> String {
-    if share.is_nan() { "-".to_owned() } else { format!("{:.1}%", share * 100.0) }
+    format!("{:.1}%", share * 100.0)
 }
 
 /// 202520 → "202,520".
@@ -211,6 +217,6 @@ mod tests {
         assert_eq!(thousands(999), "999");
         assert_eq!(thousands(1000), "1,000");
         assert_eq!(thousands(1_234_567), "1,234,567");
-        assert_eq!((percent(0.1234), percent(f64::NAN)), ("12.3%".to_owned(), "-".to_owned()));
+        assert_eq!(percent(0.1234), "12.3%");
     }
 }

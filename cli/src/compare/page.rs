@@ -8,8 +8,7 @@ use std::fmt::Write;
 use image::DynamicImage;
 
 use super::html::{data_uri, escape, fill};
-use super::statistics::Errors;
-use super::table::{COLUMNS, Row, cells, error_text, rows};
+use super::table::{COLUMNS, cells, error_text, rows, sort_keys};
 use super::{Comparison, percent, thousands};
 use crate::error::{CliError, count_of};
 use crate::picture;
@@ -70,24 +69,6 @@ fn table_head() -> String {
         format!("<th scope=\"col\"><button type=\"button\" title=\"{}\">{}</button></th>", escape(title), escape(name))
     };
     format!("<tr>{}</tr>", COLUMNS.map(heading).concat())
-}
-
-/// What a cell is sorted by, as in `table.csv`; none for a cell without a value.
-fn sort_keys(row: &Row<'_>) -> [Option<f64>; COLUMNS.len() - 1] {
-    let error = |pick: fn(&Errors) -> f64| row.errors.as_ref().map(pick);
-    let keys = [
-        Some(row.report.prepare_ms),
-        Some(row.report.shade_ms),
-        error(|e| e.mae),
-        error(|e| e.rmse),
-        error(|e| e.p99),
-        error(|e| e.pen_rmse),
-        Some(row.report.bytes as f64),
-        Some(row.shares.lit),
-        Some(row.shares.penumbra),
-        Some(row.shares.umbra),
-    ];
-    keys.map(|key| key.filter(|key| !key.is_nan()))
 }
 
 fn table_body(comparison: &Comparison) -> String {

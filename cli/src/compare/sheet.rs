@@ -126,15 +126,21 @@ impl Layout {
         self.image(canvas, 1, top, &opaque(&entry.pictures.visibility));
         self.image(canvas, 2, top, &entry.error_map);
         let (report, errors) = (&entry.report, &entry.errors);
-        let figures = format!(
-            "{} ms = prepare {} + shade {}   rmse {}   pen_rmse {}   p99 {}",
+        let mut figures = format!(
+            "{} ms = prepare {} + shade {}",
             milliseconds(report.prepare_ms + report.shade_ms),
             milliseconds(report.prepare_ms),
             milliseconds(report.shade_ms),
-            error_text(errors.rmse),
-            error_text(errors.pen_rmse),
-            error_text(errors.p99),
         );
+        if errors.valid > 0 {
+            figures += &format!("   rmse {}   p99 {}", error_text(errors.rmse), error_text(errors.p99));
+        }
+        if errors.penumbra > 0 {
+            figures += &format!("   pen_rmse {}", error_text(errors.pen_rmse));
+        }
+        if errors.missing > 0 {
+            figures += &format!("   {} pixels without a value", thousands(errors.missing));
+        }
         self.figures(canvas, top, &figures);
     }
 

@@ -1,8 +1,8 @@
 //! The table of a comparison: for a terminal, and as `table.csv`.
 
+use scene_core::metrics::{Errors, Shares};
 use serde::Serialize;
 
-use super::statistics::{Errors, Shares};
 use super::{Comparison, percent};
 use crate::error::CliError;
 use crate::report::RunReport;
@@ -27,24 +27,22 @@ struct CsvRow<'a> {
 }
 
 impl<'a> CsvRow<'a> {
-    fn new(label: &'a str, report: &'a RunReport, errors: Option<Errors>, shares: Shares) -> Self {
-        let number = |value: f64| (!value.is_nan()).then_some(value);
-        let error = |pick: fn(&Errors) -> f64| errors.as_ref().map(pick).and_then(number);
+    fn new(row: &Row<'a>) -> Self {
         Self {
-            technique: &report.technique,
-            variant: &report.variant,
-            label,
-            backend: report.backend,
-            prepare_ms: report.prepare_ms,
-            shade_ms: report.shade_ms,
-            mae: error(|e| e.mae),
-            rmse: error(|e| e.rmse),
-            p99: error(|e| e.p99),
-            pen_rmse: error(|e| e.pen_rmse),
-            bytes: report.bytes,
-            lit: number(shares.lit),
-            penumbra: number(shares.penumbra),
-            umbra: number(shares.umbra),
+            technique: &row.report.technique,
+            variant: &row.report.variant,
+            label: row.label,
+            backend: row.report.backend,
+            prepare_ms: row.report.prepare_ms,
+            shade_ms: row.report.shade_ms,
+            mae: row.error(|e| e.mae),
+            rmse: row.error(|e| e.rmse),
+            p99: row.error(|e| e.p99),
+            pen_rmse: row.pen_rmse(),
+            bytes: row.report.bytes,
+            lit: row.share(|s| s.lit),
+            penumbra: row.share(|s| s.penumbra),
+            umbra: row.share(|s| s.umbra),
         }
     }
 }
@@ -54,8 +52,7 @@ pub(crate) fn csv(comparison: &Comparison) -> Result<Vec<u8>, CliError> {
     let encode = |source: Box<dyn std::error::Error + Send + Sync>| CliError::Encode { what: "table.csv", source };
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows(comparison) {
-        let row = CsvRow::new(row.label, row.report, row.errors, row.shares);
-        writer.serialize(row).map_err(|error| encode(error.into()))?;
+        writer.serialize(CsvRow::new(&row)).map_err(|error| encode(error.into()))?;
     }
     writer.into_inner().map_err(|error| encode(error.to_string().into()))
 }
@@ -64,19 +61,40 @@ pub(crate) fn csv(comparison: &Comparison) -> Result<Vec<u8>, CliError> {
 pub(crate) struct Row<'a> {
     pub(crate) label: &'a str,
     pub(crate) report: &'a RunReport,
+    /// None for ground truth.
     pub(crate) errors: Option<Errors>,
-    pub(crate) shares: Shares,
+    /// None if there is nothing to share.
+    shares: Option<Shares>,
+}
+
+impl Row<'_> {
+    /// An error; none for ground truth, or if no pixel was compared.
+    pub(crate) fn error(&self, pick: fn(&Errors) -> f64) -> Option<f64> {
+        self.errors.as_ref().filter(|errors| errors.valid > 0).map(pick)
+    }
+
+    /// The error in penumbrae; none if there are none.
+    pub(crate) fn pen_rmse(&self) -> Option<f64> {
+        self.errors.as_ref().filter(|errors| errors.penumbra > 0).map(|errors| errors.pen_rmse)
+    }
+
+    /// A share of compared pixels.
+    pub(crate) fn share(&self, pick: fn(&Shares) -> f64) -> Option<f64> {
+        self.shares.as_ref().map(pick)
+    }
 }
 
 /// Ground truth first, then the techniques.
-pub(crate) fn rows<'a>(comparison: &'a Comparison) -> impl Iterator<Item = Row<'a>> {
+pub(crate) fn rows(comparison: &Comparison) -> impl Iterator<Item = Row<'_>> {
     let truth = &comparison.truth;
-    let first = Row { label: "ground truth", report: &truth.report, errors: None, shares: truth.shares };
-    std::iter::once(first).chain(comparison.entries.iter().map(|entry| Row {
+    let shares = move |shares| (truth.valid > 0).then_some(shares).flatten();
+    let first =
+        Row { label: "ground truth", report: &truth.report, errors: None, shares: shares(Some(truth.shares)) };
+    std::iter::once(first).chain(comparison.entries.iter().map(move |entry| Row {
         label: &entry.label,
         report: &entry.report,
         errors: Some(entry.errors),
-        shares: entry.shares,
+        shares: shares(entry.shares),
     }))
 }
 
@@ -95,25 +113,43 @@ pub(crate) const COLUMNS: [(&str, &str); 11] = [
     ("umbra", "share of compared pixels that see nothing of it"),
 ];
 
-/// The cells of a row under [`COLUMNS`].
+/// The cells of a row under [`COLUMNS`]; a dash where there is no value.
 pub(crate) fn cells(row: &Row<'_>) -> [String; COLUMNS.len()] {
-    let error = |pick: fn(&Errors) -> f64| row.errors.as_ref().map_or("-".to_owned(), |e| error_text(pick(e)));
+    let dash = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
+    let error = |error: Option<f64>| dash(error.map(error_text));
+    let share = |share: Option<f64>| dash(share.map(percent));
     [
         row.label.to_owned(),
         milliseconds(row.report.prepare_ms),
         milliseconds(row.report.shade_ms),
-        error(|e| e.mae),
-        error(|e| e.rmse),
-        error(|e| e.p99),
-        error(|e| e.pen_rmse),
+        error(row.error(|e| e.mae)),
+        error(row.error(|e| e.rmse)),
+        error(row.error(|e| e.p99)),
+        error(row.pen_rmse()),
         format!("{:.1}", row.report.bytes as f64 / 1_048_576.0),
-        percent(row.shares.lit),
-        percent(row.shares.penumbra),
-        percent(row.shares.umbra),
+        share(row.share(|s| s.lit)),
+        share(row.share(|s| s.penumbra)),
+        share(row.share(|s| s.umbra)),
     ]
 }
 
-/// An error with the digits that ground truth supports; a dash for none.
+/// What the cells after the first are sorted by.
+pub(crate) fn sort_keys(row: &Row<'_>) -> [Option<f64>; COLUMNS.len() - 1] {
+    [
+        Some(row.report.prepare_ms),
+        Some(row.report.shade_ms),
+        row.error(|e| e.mae),
+        row.error(|e| e.rmse),
+        row.error(|e| e.p99),
+        row.pen_rmse(),
+        Some(row.report.bytes as f64),
+        row.share(|s| s.lit),
+        row.share(|s| s.penumbra),
+        row.share(|s| s.umbra),
+    ]
+}
+
+/// An error with the digits that ground truth supports; a dash for NaN.
 pub(crate) fn error_text(error: f64) -> String {
     if error.is_nan() { "-".to_owned() } else { format!("{error:.4}") }
 }

@@ -58,11 +58,6 @@ impl Canvas {
         Self { image: RgbImage::from_pixel(width, height, Pixel(background)) }
     }
 
-    /// Pixels a row.
-    pub(crate) fn width(&self) -> u32 {
-        self.image.width()
-    }
-
     /// Fills a rectangle with its top left corner at (x, y).
     pub(crate) fn fill(&mut self, x: u32, y: u32, width: u32, height: u32, colour: Rgb) {
         let (right, bottom) = (x.saturating_add(width), y.saturating_add(height));

@@ -24,20 +24,14 @@ pub(crate) fn diverging(error: f32) -> Rgb {
     srgb_from_linear(linear.clamp(Vec3::ZERO, Vec3::ONE))
 }
 
-/// The map of `technique − reference` over valid pixels, saturated at ±`scale`. Pixels that see a surface but
-/// are not compared are striped grey.
-pub(crate) fn error_map(
-    technique: &VisibilityImage,
-    reference: &VisibilityImage,
-    valid: &[bool],
-    scale: f32,
-) -> RgbImage {
+/// The map of signed errors, NaN at pixels that are not compared, saturated at ±`scale`. Those of them that see a
+/// surface, by the reference, are striped grey.
+pub(crate) fn error_map(signed: &[f32], reference: &VisibilityImage, scale: f32) -> RgbImage {
     RgbImage::from_fn(reference.width, reference.height, |x, y| {
         let pixel = y as usize * reference.width as usize + x as usize;
-        let truth = reference.values[pixel];
-        Pixel(if valid[pixel] {
-            diverging((technique.values[pixel] - truth) / scale)
-        } else if truth.is_nan() {
+        Pixel(if !signed[pixel].is_nan() {
+            diverging(signed[pixel] / scale)
+        } else if reference.values[pixel].is_nan() {
             NOTHING
         } else {
             NOT_COMPARED[((x + y) / 3 % 2) as usize]
@@ -98,8 +92,7 @@ mod tests {
     #[test]
     fn a_pixel_shows_its_kind() {
         let reference = VisibilityImage { width: 4, height: 1, values: vec![0.5, 0.5, 0.5, f32::NAN] };
-        let technique = VisibilityImage { values: vec![0.5, 0.75, 1.0, f32::NAN], ..reference.clone() };
-        let map = error_map(&technique, &reference, &[true, true, false, false], 0.25);
+        let map = error_map(&[0.0, 0.25, f32::NAN, f32::NAN], &reference, 0.25);
         let at = |x| map.get_pixel(x, 0).0;
         assert_eq!((at(0), at(1), at(3)), (diverging(0.0), diverging(1.0), NOTHING));
         assert!(NOT_COMPARED.contains(&at(2)));
