@@ -37,10 +37,11 @@ pub struct Reference {
     pub visibility: VisibilityImage,
     /// Per pixel the estimated standard error of V; NaN where nothing is seen.
     ///
-    /// Its square is an unbiased estimate of the variance of V: the two samples of a stratum are independent, so
-    /// their differences measure what stratification leaves. It is 0 where the samples of every stratum agree.
-    /// For a light without extent that is the truth. If all samples of an extended light are lit (or all dark),
-    /// what they missed is a share of it above 3 / samples with a chance below e⁻³ = 5 %.
+    /// Its square estimates the variance of V without bias: the two samples of a stratum are independent, so their
+    /// differences measure what stratification leaves. Where no stratum disagrees, that would be 0, though light or
+    /// shadow too thin for any sample can remain; the error is then given as 1 / samples, its standard deviation
+    /// given that all samples agree and nothing else is known. It is 0 only where V is certain: for a
+    /// light without extent, and where no ray was needed.
     pub std_error: Vec<f32>,
     /// Shadow rays traced. Samples below a surface's tangent plane or outside a spot's cone need none.
     pub rays: u64,
@@ -190,11 +191,15 @@ impl<O: Occlusion> Tracer<'_, O> {
         *rays += self.trace(position, normal, scratch);
 
         let seen = scratch.seen.iter().filter(|&&s| s).count();
+        let n = samples as f32;
+        let visibility = seen as f32 / n;
+        if view.is_single() {
+            return Estimate::certain(visibility);
+        }
         // A stratum's mean (a + b)/2 has the variance (a − b)²/4, so the mean over n/2 strata has the number
         // of strata that disagree over n².
         let split = scratch.seen.chunks_exact(2).filter(|pair| pair[0] != pair[1]).count();
-        let n = samples as f32;
-        Estimate { visibility: seen as f32 / n, std_error: (split as f32).sqrt() / n }
+        Estimate { visibility, std_error: (split.max(1) as f32).sqrt() / n }
     }
 
     /// Sets `scratch.seen` for all of `scratch.points`; returns how many rays it took.
