@@ -1,0 +1,46 @@
+//! `gnomon render`: the shadows of one light by one technique.
+
+use scene_core::raster::render_gbuffer;
+
+use crate::args::RenderArgs;
+use crate::compare::table::milliseconds;
+use crate::console::Console;
+use crate::error::CliError;
+use crate::output::OutputFolder;
+use crate::picture::shading::Shading;
+use crate::report::json_file;
+use crate::{measure, npy, picture, scene_source, techniques};
+
+pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<(), CliError> {
+    let factory = techniques::find(&args.technique)?;
+    let overrides = techniques::with_seed(factory, &args.set, args.scene.seed);
+    let technique = factory.create(args.preset.as_deref(), &overrides)?;
+    measure::check_backend(technique.as_ref(), args.backend)?;
+    let out = OutputFolder::check(&args.out)?;
+    let view = scene_source::view(&args.scene, console)?;
+
+    let run = {
+        let _working = console.working(format!("rendering with {}", args.technique));
+        let gbuffer = render_gbuffer(&view.setup.scene, &view.setup.camera);
+        let run = measure::run(technique.as_ref(), &view, &gbuffer)?;
+        let shading = Shading::new(&gbuffer, &view.setup.camera, view.light());
+        let files = [
+            ("image.png", picture::png(shading.picture(&run.visibility))?),
+            ("visibility.png", picture::png(picture::grey(&run.visibility))?),
+            ("visibility.npy", npy::visibility(&run.visibility)?),
+            ("report.json", json_file(&run.report)),
+        ];
+        out.write(&files)?;
+        run
+    };
+    let report = &run.report;
+    let text = format!(
+        "{}: {} {}, prepare {} ms, shade {} ms\n",
+        out.path().display(),
+        report.technique,
+        report.variant,
+        milliseconds(report.prepare_ms),
+        milliseconds(report.shade_ms),
+    );
+    console.result(report, &text)
+}
