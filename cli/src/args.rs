@@ -37,10 +37,16 @@ pub(crate) struct Arguments {
 #[derive(Args, Debug)]
 pub(crate) struct GlobalArgs {
     /// Print one JSON object on stdout and nothing else there (nothing if the command fails)
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = "Common options")]
     pub(crate) json: bool,
     /// Threads to compute with [default: one per core]
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(
+        long,
+        global = true,
+        value_name = "N",
+        help_heading = "Common options",
+        value_parser = clap::value_parser!(u16).range(1..=1024)
+    )]
     pub(crate) threads: Option<u16>,
 }
 
@@ -65,7 +71,7 @@ pub(crate) struct SceneArgs {
     /// A scene file (.toml, .json), a mesh (.obj, .gltf, .glb) or a built-in scene (`gnomon scenes`)
     ///
     /// A bare mesh gets a ground, a camera and a light. A built-in scene takes parameters:
-    /// NAME:key=value,key=value. A name of a built-in scene goes before a file of that name: write ./NAME for
+    /// NAME:key=value,key=value. If a file has the name of a built-in scene, write ./NAME for
     /// the file.
     #[arg(value_name = "SCENE")]
     pub(crate) scene: String,
@@ -77,7 +83,7 @@ pub(crate) struct SceneArgs {
     pub(crate) light: usize,
     /// Seconds by which what moves in a built-in scene has moved [default: 0]
     #[arg(long, value_name = "T", value_parser = parse_time, allow_hyphen_values = true)]
-    pub(crate) time: Option<f64>,
+    pub(crate) time: Option<f32>,
     /// Seed of all random choices: the same seed gives the same image, whatever the number of threads
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
@@ -102,8 +108,9 @@ Examples:
   gnomon compare scene.toml --techniques shadow-map,shadow-map@high --samples 1024
 
 Writes index.html (open it: a slider between any two images), contact-sheet.png, table.csv and report.json.
-Errors are taken over valid pixels: those whose surface faces the light (n·l > 0.05) with the whole light
-above it. mae is the mean of |error|, rmse the root of its mean square, p99 its 99th percentile, pen_rmse the
+
+Errors are taken over valid pixels: those whose surface faces the light (n·l > 0.05) with the whole light \
+above it. mae is the mean of |error|, rmse the root of its mean square, p99 its 99th percentile, pen_rmse the \
 rmse in and around penumbrae. Times are the fastest of up to three runs; ground truth runs once.")]
 pub(crate) struct CompareArgs {
     #[command(flatten)]
@@ -132,7 +139,7 @@ Examples:
   gnomon render dragon.obj --technique shadow-map --set map_size=4096 --out out/dragon
   gnomon render quads:count=5 --technique shadow-map --size 640x480 --json --out out/quads
 
-Writes image.png (shaded), visibility.png (grey, transparent where nothing is seen), visibility.npy (float32,
+Writes image.png (shaded), visibility.png (grey, transparent where nothing is seen), visibility.npy (float32, \
 H×W, NaN where nothing is seen) and report.json (milliseconds per stage, bytes, what was skipped).")]
 pub(crate) struct RenderArgs {
     #[command(flatten)]
@@ -161,8 +168,8 @@ Examples:
   gnomon reference cornell --out out/truth
   gnomon reference dragon.obj --samples 1024 --size 512x512 --out out/dragon-truth
 
-Writes image.png, visibility.png and report.json as `render` does, and NumPy arrays: visibility.npy and
-std_error.npy (float32, H×W: V and the standard error of each pixel's V, NaN where nothing is seen), valid.npy
+Writes image.png, visibility.png and report.json as `render` does, and NumPy arrays: visibility.npy and \
+std_error.npy (float32, H×W: V and the standard error of each pixel's V, NaN where nothing is seen), valid.npy \
 (bool, H×W: which pixels may be compared) and position.npy (float32, H×W×3: world-space positions).")]
 pub(crate) struct ReferenceArgs {
     #[command(flatten)]
@@ -205,8 +212,8 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
         .ok_or_else(|| format!("give it as WIDTHxHEIGHT, each from 1 to {max}, such as 640x480"))
 }
 
-fn parse_time(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|time: &f64| time.is_finite()).ok_or_else(|| "give seconds, such as 1.5".to_owned())
+fn parse_time(text: &str) -> Result<f32, String> {
+    text.parse().ok().filter(|time: &f32| time.is_finite()).ok_or_else(|| "give seconds, such as 1.5".to_owned())
 }
 
 fn parse_error_scale(text: &str) -> Result<f32, String> {

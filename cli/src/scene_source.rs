@@ -61,10 +61,9 @@ pub(crate) fn view(args: &SceneArgs, console: &Console) -> Result<View, CliError
     Ok(View { setup, light_index: args.light })
 }
 
-fn load(scene: &str, time: Option<f64>) -> Result<SceneSetup, SceneSourceError> {
-    let name = scene.split(':').next().unwrap_or(scene);
-    if is_built_in(name) {
-        return Ok(scenes::build(scene, time.unwrap_or(0.0) as f32)?);
+fn load(scene: &str, time: Option<f32>) -> Result<SceneSetup, SceneSourceError> {
+    if is_built_in(scene.split_once(':').map_or(scene, |(name, _)| name).trim()) {
+        return Ok(scenes::build(scene, time.unwrap_or(0.0))?);
     }
     let path = Path::new(scene);
     if !path.exists() && path.extension().is_none() && path.components().count() < 2 {
