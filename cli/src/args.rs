@@ -213,7 +213,10 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
 }
 
 fn parse_time(text: &str) -> Result<f32, String> {
-    text.parse().ok().filter(|time: &f32| time.is_finite()).ok_or_else(|| "give seconds, such as 1.5".to_owned())
+    text.parse()
+        .ok()
+        .filter(|time: &f32| time.is_finite())
+        .ok_or_else(|| "give seconds, such as 1.5".to_owned())
 }
 
 fn parse_error_scale(text: &str) -> Result<f32, String> {

@@ -16,7 +16,9 @@
 //! | not planar | the triangles of its projection, with the true corners |
 
 use glam::{DVec2, DVec3, Vec3};
-use spade::{ConstrainedDelaunayTriangulation, Intersection, LineIntersectionIterator, Point2, Triangulation};
+use spade::{
+    ConstrainedDelaunayTriangulation, Intersection, LineIntersectionIterator, Point2, Triangulation,
+};
 use thiserror::Error;
 
 /// What had to be mended in a polygon.
@@ -54,10 +56,7 @@ pub enum PolygonFault {
 ///
 /// # Errors
 /// See the table of the module; `triangles` is unchanged then.
-pub fn triangulate(
-    corners: &[Vec3],
-    triangles: &mut Vec<[u32; 3]>,
-) -> Result<Option<Repair>, PolygonFault> {
+pub fn triangulate(corners: &[Vec3], triangles: &mut Vec<[u32; 3]>) -> Result<Option<Repair>, PolygonFault> {
     match *corners {
         [] | [_] | [_, _] => Ok(Some(Repair::NoArea)),
         [_, _, _] => {
@@ -321,8 +320,16 @@ mod tests {
     #[test]
     fn a_hole_joined_by_a_bridge_stays_a_hole() {
         let frame = polygon(&[
-            [0., 0.], [4., 0.], [4., 4.], [0., 4.], [0., 0.], // around
-            [1., 1.], [1., 3.], [3., 3.], [3., 1.], [1., 1.], // the hole, the other way
+            [0., 0.],
+            [4., 0.],
+            [4., 4.],
+            [0., 4.],
+            [0., 0.], // around
+            [1., 1.],
+            [1., 3.],
+            [3., 3.],
+            [3., 1.],
+            [1., 1.], // the hole, the other way
         ]);
         let (triangles, repair) = run(&frame);
         assert_eq!(repair, None);
