@@ -30,8 +30,7 @@ const DOOR: f32 = 0.5;
 
 fn build(values: &Values<'_>, _time: f32) -> Stage {
     let light = Light::Sphere { center: Vec3::new(-6.5, 8.5, 5.5), radius: values.real("light") };
-    let mut stage =
-        Stage::new(camera(Vec3::new(4.4, 4.6, 11.0), Vec3::new(0.55, 1.4, 0.6), 37.0, 0.1), light);
+    let mut stage = Stage::new(camera(Vec3::new(4.4, 4.6, 11.0), Vec3::new(0.3, 1.4, 0.6), 37.0, 0.1), light);
     stage.add("ground", cuboid(Vec3::new(-9.0, -0.2, -8.0), Vec3::new(9.0, 0.0, 7.0)));
 
     // Logs of crossing walls interlock half a log apart in height.

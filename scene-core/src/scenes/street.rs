@@ -38,8 +38,8 @@ fn build(values: &Values<'_>, time: f32) -> Stage {
     let length = values.real("length");
     let mut random = Random::new(values.whole("seed"), 0);
     let (sin, cos) = values.real("elevation").to_radians().sin_cos();
-    // From the left and behind: shadows cross the road and climb the houses on the right.
-    let direction = Vec3::new(0.72 * cos, -sin, -0.694 * cos);
+    // From behind and a little from the left: shadows run along the road and reach over half of it.
+    let direction = Vec3::new(0.4 * cos, -sin, -0.917 * cos);
     let light = Light::Directional { direction, angular_radius: values.real("light").to_radians() };
     let mut stage =
         Stage::new(camera(Vec3::new(-1.2, 6.0, 20.0), Vec3::new(0.6, 5.4, -20.0), 50.0, 0.3), light);
