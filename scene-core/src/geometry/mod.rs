@@ -12,4 +12,4 @@ pub use alpha::{AlphaMask, Wrap};
 pub use mesh::{MeshError, TriangleMesh};
 pub use repair::{Repairs, drop_unused_vertices, remove_faulty_faces};
 pub use scene::{Object, ObjectFlags, Scene, SceneError};
-pub use triangulate::{PolygonFault, Repair, triangulate};
+pub use triangulate::{MAX_CROSSING, PolygonFault, Repair, triangulate};
