@@ -14,9 +14,15 @@ use gnomon_scene_core::{GBuffer, Light, Scene};
 const SAMPLES: u32 = 1024;
 
 /// A caster given by a formula: whether the ray `origin + t·direction`, 0 < t < `end`, meets it.
-struct Analytic<F>(F);
+struct Analytic(Box<dyn Fn(DVec3, DVec3, f64) -> bool + Sync>);
 
-impl<F: Fn(DVec3, DVec3, f64) -> bool + Sync> Occlusion for Analytic<F> {
+impl Analytic {
+    fn new(meets: impl Fn(DVec3, DVec3, f64) -> bool + Sync + 'static) -> Self {
+        Self(Box::new(meets))
+    }
+}
+
+impl Occlusion for Analytic {
     fn shadow_origin(&self, position: Vec3, _normal: Vec3) -> Vec3 {
         position
     }
@@ -30,19 +36,16 @@ impl<F: Fn(DVec3, DVec3, f64) -> bool + Sync> Occlusion for Analytic<F> {
 }
 
 /// The horizontal plane at `height`, where `inside` holds in (x, z).
-fn sheet(
-    height: f64,
-    inside: impl Fn(DVec2) -> bool + Sync,
-) -> Analytic<impl Fn(DVec3, DVec3, f64) -> bool + Sync> {
-    Analytic(move |origin: DVec3, direction: DVec3, end: f64| {
+fn sheet(height: f64, inside: impl Fn(DVec2) -> bool + Sync + 'static) -> Analytic {
+    Analytic::new(move |origin, direction, end| {
         let t = (height - origin.y) / direction.y;
         let hit = origin + t * direction;
         t > 0.0 && t < end && inside(DVec2::new(hit.x, hit.z))
     })
 }
 
-fn ball(center: DVec3, radius: f64) -> Analytic<impl Fn(DVec3, DVec3, f64) -> bool + Sync> {
-    Analytic(move |origin: DVec3, direction: DVec3, end: f64| {
+fn ball(center: DVec3, radius: f64) -> Analytic {
+    Analytic::new(move |origin, direction, end| {
         let nearest = (center - origin).dot(direction) / direction.length_squared();
         nearest > 0.0 && nearest < end && (origin + nearest * direction).distance(center) < radius
     })
@@ -172,8 +175,7 @@ fn half_plane_under_a_skewed_rect_is_a_clipped_polygon() {
 
 /// A turned square at height 1 under a square light at height 3: from the receiver its image on the light's plane
 /// is three times as large.
-fn square_over_plane() -> (Analytic<impl Fn(DVec3, DVec3, f64) -> bool + Sync>, Light, impl Fn(DVec3) -> f64)
-{
+fn square_over_plane() -> (Analytic, Light, impl Fn(DVec3) -> f64) {
     let (turn, half) = (0.5, 0.25);
     let square = sheet(1.0, move |p| DVec2::from_angle(-turn).rotate(p).abs().max_element() < half);
     let light = Light::Rect { center: Vec3::Y * 3.0, half_u: Vec3::X * 0.8, half_v: Vec3::Z * 0.8 };
@@ -252,7 +254,7 @@ fn half_plane_under_the_sun_is_a_segment() {
         let edge = 0.4;
         let casters = sheet(2.0, move |p| p.x < edge);
         let (sun, radius) = (-direction.as_dvec3().normalize(), f64::from(angular_radius));
-        let side = |x: DVec3| DVec3::new(2.0, x.x - f64::from(0.4), 0.0).normalize();
+        let side = |x: DVec3| DVec3::new(2.0, x.x - edge, 0.0).normalize();
         let gbuffer = floor(3000, half_side);
         assert_agreement(&casters, &light, &gbuffer, |x| {
             let hemisphere = std::f64::consts::FRAC_PI_2;
@@ -288,7 +290,7 @@ fn planted_faults_are_noticed() {
     let partly = |v: f32| v > 0.0 && v < 1.0;
     assert!(
         spoiled(&|v, _| if partly(*v) {
-            *v += 0.001
+            *v += 0.001;
         })
         .is_err(),
         "a bias of 0.001"
@@ -298,7 +300,7 @@ fn planted_faults_are_noticed() {
     assert!(spoiled(&|v, _| *v = 1.0 - *v).is_err(), "inverted");
     assert!(
         spoiled(&|v, _| if *v == 1.0 {
-            *v = 0.999
+            *v = 0.999;
         })
         .is_err(),
         "lit pixels not quite lit"
