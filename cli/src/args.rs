@@ -62,6 +62,10 @@ pub(crate) enum Command {
     /// Techniques with their settings, units, ranges, defaults and presets
     Techniques(TechniquesArgs),
     /// Built-in scenes and their parameters
+    #[command(after_help = "\
+Examples:
+  gnomon scenes
+  gnomon compare ball:height=1.2 --time 0.4      a scene with a parameter set, after 0.4 seconds")]
     Scenes,
 }
 
@@ -213,7 +217,10 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
 }
 
 fn parse_time(text: &str) -> Result<f32, String> {
-    text.parse().ok().filter(|time: &f32| time.is_finite()).ok_or_else(|| "give seconds, such as 1.5".to_owned())
+    text.parse()
+        .ok()
+        .filter(|time: &f32| time.is_finite())
+        .ok_or_else(|| "give seconds, such as 1.5".to_owned())
 }
 
 fn parse_error_scale(text: &str) -> Result<f32, String> {

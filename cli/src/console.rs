@@ -25,7 +25,9 @@ impl Console {
     pub(crate) fn result(&self, json: &impl Serialize, text: &str) -> Result<(), CliError> {
         let mut out = std::io::stdout().lock();
         let written = if self.json {
-            serde_json::to_writer_pretty(&mut out, json).map_err(std::io::Error::from).and_then(|()| writeln!(out))
+            serde_json::to_writer_pretty(&mut out, json)
+                .map_err(std::io::Error::from)
+                .and_then(|()| writeln!(out))
         } else {
             out.write_all(text.as_bytes())
         };
@@ -55,7 +57,11 @@ impl Console {
     }
 
     fn bar(&self, bar: ProgressBar) -> ProgressBar {
-        bar.set_draw_target(if self.progress { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() });
+        bar.set_draw_target(if self.progress {
+            ProgressDrawTarget::stderr()
+        } else {
+            ProgressDrawTarget::hidden()
+        });
         bar
     }
 }

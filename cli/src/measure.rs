@@ -48,7 +48,11 @@ pub(crate) fn run(technique: &dyn ShadowTechnique, view: &View, gbuffer: &GBuffe
 
 /// The fastest of up to `RUNS` runs; no further one begins after `BUDGET_MS`. The first one pays for cold
 /// caches and fresh memory, which a renderer pays once and not per frame.
-pub(crate) fn fastest(technique: &dyn ShadowTechnique, view: &View, gbuffer: &GBuffer) -> Result<Run, CliError> {
+pub(crate) fn fastest(
+    technique: &dyn ShadowTechnique,
+    view: &View,
+    gbuffer: &GBuffer,
+) -> Result<Run, CliError> {
     const RUNS: usize = 3;
     const BUDGET_MS: f64 = 2000.0;
     let total_ms = |run: &Run| run.report.prepare_ms + run.report.shade_ms;

@@ -25,11 +25,15 @@ pub(crate) fn positions(gbuffer: &GBuffer) -> Result<Vec<u8>, CliError> {
     encode(&[gbuffer.height, gbuffer.width, 3], gbuffer.position.iter().flat_map(|p| p.to_array()))
 }
 
-fn encode<T: npyz::AutoSerialize>(shape: &[u32], values: impl Iterator<Item = T>) -> Result<Vec<u8>, CliError> {
+fn encode<T: npyz::AutoSerialize>(
+    shape: &[u32],
+    values: impl Iterator<Item = T>,
+) -> Result<Vec<u8>, CliError> {
     let shape: Vec<u64> = shape.iter().map(|&side| u64::from(side)).collect();
     let write = || {
         let mut bytes = Vec::new();
-        let mut writer = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(&mut bytes).begin_nd()?;
+        let mut writer =
+            npyz::WriteOptions::new().default_dtype().shape(&shape).writer(&mut bytes).begin_nd()?;
         writer.extend(values)?;
         writer.finish()?;
         Ok(bytes)

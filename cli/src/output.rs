@@ -65,10 +65,7 @@ impl OutputFolder {
             .map(|a| if a.as_os_str().is_empty() { Path::new(".") } else { a })
             .find(|a| a.exists())
             .unwrap_or(Path::new("."));
-        tempfile::Builder::new()
-            .prefix(".gnomon-")
-            .tempdir_in(ancestor)
-            .map_err(|source| self.fault(source))
+        tempfile::Builder::new().prefix(".gnomon-").tempdir_in(ancestor).map_err(|source| self.fault(source))
     }
 
     fn fault(&self, source: io::Error) -> CliError {
@@ -98,7 +95,10 @@ mod tests {
         let folder = OutputFolder::check(&path).unwrap();
         assert!(names(root.path()).is_empty(), "checking left something behind");
         folder.write(&[("one", vec![1]), ("two", vec![2])]).unwrap();
-        assert_eq!((names(root.path()), names(&path)), (vec!["a".to_owned()], vec!["one".into(), "two".into()]));
+        assert_eq!(
+            (names(root.path()), names(&path)),
+            (vec!["a".to_owned()], vec!["one".into(), "two".into()])
+        );
         fs::write(path.join("mine"), "kept").unwrap();
         folder.write(&[("two", vec![3])]).unwrap();
         assert_eq!(names(&path), ["mine", "one", "two"]);

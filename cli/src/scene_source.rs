@@ -52,7 +52,11 @@ pub(crate) fn view(args: &SceneArgs, console: &Console) -> Result<View, CliError
         console.note(&format!("note: {note}"));
     }
     if args.light >= setup.lights.len() {
-        return Err(CliError::NoSuchLight { scene: setup.name, index: args.light, lights: setup.lights.len() });
+        return Err(CliError::NoSuchLight {
+            scene: setup.name,
+            index: args.light,
+            lights: setup.lights.len(),
+        });
     }
     if let Some((width, height)) = args.size {
         setup.camera = setup.camera.with_size(width, height);

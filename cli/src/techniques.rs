@@ -81,8 +81,10 @@ pub(crate) struct Chosen {
 }
 
 fn variants(factory: &dyn TechniqueFactory) -> Option<&'static [&'static str]> {
-    factory.settings().iter().find(|setting| setting.name == "variant").and_then(|setting| match setting.kind {
-        SettingKind::Choice(variants) => Some(variants),
-        _ => None,
+    factory.settings().iter().find(|setting| setting.name == "variant").and_then(|setting| {
+        match setting.kind {
+            SettingKind::Choice(variants) => Some(variants),
+            _ => None,
+        }
     })
 }

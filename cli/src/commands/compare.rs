@@ -35,7 +35,10 @@ pub(crate) fn run(args: &CompareArgs, console: &Console) -> Result<(), CliError>
         match measure::fastest(chosen.technique.as_ref(), &view, &gbuffer) {
             Ok(run) => entries.push(Entry::new(chosen.label, run, &truth, &shading, args.error_scale)?),
             Err(CliError::Technique(TechniqueError::Unsupported { input, why, .. })) => {
-                refused.push(Refused { technique: chosen.label, why: format!("it does not take {input}: {why}") });
+                refused.push(Refused {
+                    technique: chosen.label,
+                    why: format!("it does not take {input}: {why}"),
+                });
             }
             Err(error) => return Err(error),
         }
@@ -73,9 +76,13 @@ mod tests {
 
     #[test]
     fn folders_stay_below_out() {
-        for (scene, folder) in
-            [("dragon", "dragon"), ("../../etc", "etc"), ("quads:count=5", "quads-count-5"), ("", "scene"), ("..", "scene")]
-        {
+        for (scene, folder) in [
+            ("dragon", "dragon"),
+            ("../../etc", "etc"),
+            ("quads:count=5", "quads-count-5"),
+            ("", "scene"),
+            ("..", "scene"),
+        ] {
             assert_eq!(default_out(scene), Path::new("out").join(folder));
         }
     }

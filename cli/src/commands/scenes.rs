@@ -27,7 +27,8 @@ fn describe(text: &mut String, scene: &BuiltIn) {
     for p in scene.parameters {
         let kind = if p.whole { "a whole number" } else { "a number" };
         let _ = writeln!(text, "    {:width$}  {}", p.name, p.doc);
-        let _ = writeln!(text, "    {:width$}  {kind} from {} to {}; default {}", "", p.min, p.max, p.default);
+        let _ =
+            writeln!(text, "    {:width$}  {kind} from {} to {}; default {}", "", p.min, p.max, p.default);
     }
     text.push('\n');
 }

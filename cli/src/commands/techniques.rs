@@ -39,7 +39,12 @@ fn word(value: &impl serde::Serialize) -> String {
     serde_json::to_value(value).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
-fn describe(text: &mut String, factory: &dyn TechniqueFactory, support: &[(String, Support)], defaults: &Value) {
+fn describe(
+    text: &mut String,
+    factory: &dyn TechniqueFactory,
+    support: &[(String, Support)],
+    defaults: &Value,
+) {
     // Writing to a string cannot fail.
     let _ = writeln!(text, "{}: {}", factory.name(), factory.summary());
     let _ = writeln!(text, "\n  takes");

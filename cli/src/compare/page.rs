@@ -60,13 +60,18 @@ fn facts(comparison: &Comparison) -> String {
         ("penumbra", percent(truth.shares.penumbra)),
         ("umbra", percent(truth.shares.umbra)),
     ];
-    let fact = |(name, value): (&str, String)| format!("<div><dt>{name}</dt><dd>{}</dd></div>\n", escape(&value));
+    let fact =
+        |(name, value): (&str, String)| format!("<div><dt>{name}</dt><dd>{}</dd></div>\n", escape(&value));
     facts.map(fact).concat()
 }
 
 fn table_head() -> String {
     let heading = |(name, title): (&str, &str)| {
-        format!("<th scope=\"col\"><button type=\"button\" title=\"{}\">{}</button></th>", escape(title), escape(name))
+        format!(
+            "<th scope=\"col\"><button type=\"button\" title=\"{}\">{}</button></th>",
+            escape(title),
+            escape(name)
+        )
     };
     format!("<tr>{}</tr>", COLUMNS.map(heading).concat())
 }
@@ -111,8 +116,10 @@ fn gallery(comparison: &Comparison) -> Result<String, CliError> {
     let runs = std::iter::once(("ground truth", &truth.pictures, none))
         .chain(comparison.entries.iter().map(|e| (e.label.as_str(), &e.pictures, Some(&e.error_map))));
     for (run, (name, pictures, error_map)) in runs.enumerate() {
-        let mut kinds: Vec<(&str, DynamicImage)> =
-            vec![("shaded", pictures.shaded.clone().into()), ("visibility", pictures.visibility.clone().into())];
+        let mut kinds: Vec<(&str, DynamicImage)> = vec![
+            ("shaded", pictures.shaded.clone().into()),
+            ("visibility", pictures.visibility.clone().into()),
+        ];
         kinds.extend(error_map.map(|map| ("error", map.clone().into())));
         let name = escape(name);
         let _ = writeln!(html, "<h3>{name}</h3>\n<div class=\"row\">");

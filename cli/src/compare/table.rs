@@ -49,7 +49,8 @@ impl<'a> CsvRow<'a> {
 
 /// `table.csv`: ground truth first, then the techniques.
 pub(crate) fn csv(comparison: &Comparison) -> Result<Vec<u8>, CliError> {
-    let encode = |source: Box<dyn std::error::Error + Send + Sync>| CliError::Encode { what: "table.csv", source };
+    let encode =
+        |source: Box<dyn std::error::Error + Send + Sync>| CliError::Encode { what: "table.csv", source };
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows(comparison) {
         writer.serialize(CsvRow::new(&row)).map_err(|error| encode(error.into()))?;
@@ -88,8 +89,12 @@ impl Row<'_> {
 pub(crate) fn rows(comparison: &Comparison) -> impl Iterator<Item = Row<'_>> {
     let truth = &comparison.truth;
     let shares = move |shares| (truth.valid > 0).then_some(shares).flatten();
-    let first =
-        Row { label: "ground truth", report: &truth.report, errors: None, shares: shares(Some(truth.shares)) };
+    let first = Row {
+        label: "ground truth",
+        report: &truth.report,
+        errors: None,
+        shares: shares(Some(truth.shares)),
+    };
     std::iter::once(first).chain(comparison.entries.iter().map(move |entry| Row {
         label: &entry.label,
         report: &entry.report,

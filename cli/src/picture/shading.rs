@@ -41,7 +41,13 @@ impl Shading {
         let up = camera.up.normalize_or(Vec3::Y);
         let irradiance: Vec<f32> = (0..gbuffer.pixel_count())
             .into_par_iter()
-            .map(|i| if gbuffer.is_seen(i) { irradiance(light, gbuffer.position[i], gbuffer.normal[i]) } else { 0.0 })
+            .map(|i| {
+                if gbuffer.is_seen(i) {
+                    irradiance(light, gbuffer.position[i], gbuffer.normal[i])
+                } else {
+                    0.0
+                }
+            })
             .collect();
         let exposure = exposure(&irradiance);
         let (base, direct) = (0..gbuffer.pixel_count())
@@ -90,9 +96,12 @@ fn irradiance(light: &Light, position: Vec3, normal: Vec3) -> f32 {
         }
     };
     let emission = match *light {
-        Light::Rect { half_u, half_v, .. } => {
-            half_u.normalize_or_zero().cross(half_v.normalize_or_zero()).normalize_or_zero().dot(to_light).abs()
-        }
+        Light::Rect { half_u, half_v, .. } => half_u
+            .normalize_or_zero()
+            .cross(half_v.normalize_or_zero())
+            .normalize_or_zero()
+            .dot(to_light)
+            .abs(),
         Light::Disk { normal, .. } => normal.normalize_or_zero().dot(to_light).abs(),
         Light::Spot { direction, outer, inner, .. } => {
             let cos = direction.normalize_or_zero().dot(-to_light);

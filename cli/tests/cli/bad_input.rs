@@ -36,7 +36,7 @@ fn usage() {
         (with(&["--size", "99999x9"]), "640x480"),
         (with(&["--threads", "0"]), "--threads"),
         (with(&["--time", "nan"]), "seconds"),
-        (with(&["--seed", "-1"]), "--seed"),
+        (with(&["--seed", "banana"]), "--seed"),
         (with(&["--light", "7"]), "no light 7"),
         (with(&["--preset", "nonesuch"]), "no preset 'nonesuch'"),
         (with(&["--set", "nonesuch=1"]), "no setting 'nonesuch'"),

@@ -82,7 +82,8 @@ fn a_technique_named_twice_runs_once_and_presets_have_rows() {
     let report = bench.json("o/report.json");
     let labels: Vec<&str> =
         report["techniques"].as_array().unwrap().iter().map(|t| t["label"].as_str().unwrap()).collect();
-    let with_preset = labels.iter().filter(|label| label.starts_with(&format!("shadow-map@{preset} "))).count();
+    let with_preset =
+        labels.iter().filter(|label| label.starts_with(&format!("shadow-map@{preset} "))).count();
     assert_eq!(with_preset, 1, "{labels:?}");
     assert!(labels.iter().any(|label| label.starts_with("shadow-map ")), "{labels:?}");
 }

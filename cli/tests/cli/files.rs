@@ -49,8 +49,21 @@ fn a_report_has_exactly_its_keys() {
         let report = bench.json(name);
         let keys: BTreeSet<&str> = report.as_object().unwrap().keys().map(String::as_str).collect();
         let expected = [
-            "adapter", "backend", "bytes", "height", "light", "prepare_ms", "scene", "settings", "shade_ms", "skipped",
-            "stages_ms", "technique", "triangles", "variant", "width",
+            "adapter",
+            "backend",
+            "bytes",
+            "height",
+            "light",
+            "prepare_ms",
+            "scene",
+            "settings",
+            "shade_ms",
+            "skipped",
+            "stages_ms",
+            "technique",
+            "triangles",
+            "variant",
+            "width",
         ];
         assert_eq!(keys, BTreeSet::from(expected), "{name}");
         assert_eq!((&report["width"], &report["height"]), (&32.into(), &24.into()));
@@ -78,7 +91,12 @@ fn reference_writes_values_that_belong_together() {
     assert_eq!(
         bench.names("out/t"),
         [
-            "image.png", "position.npy", "report.json", "std_error.npy", "valid.npy", "visibility.npy",
+            "image.png",
+            "position.npy",
+            "report.json",
+            "std_error.npy",
+            "valid.npy",
+            "visibility.npy",
             "visibility.png"
         ]
     );
@@ -127,7 +145,8 @@ fn files_of_the_user_stay() {
 fn what_moves_has_moved() {
     let bench = Workbench::new();
     let values = |time: &str| {
-        let command = ["reference", "ball", "--size", "32x24", "--samples", "4", "--out", "o", "--time", time];
+        let command =
+            ["reference", "ball", "--size", "32x24", "--samples", "4", "--out", "o", "--time", time];
         bench.done(&command);
         std::fs::read(bench.path("o/position.npy")).unwrap()
     };

@@ -18,7 +18,10 @@ fn json_is_one_object_and_messages_go_elsewhere() {
     ] {
         bench.done(&command).json();
     }
-    assert_eq!(bench.done(&with_tiny(&["compare", "quads", "--samples", "2"])).json(), bench.json("out/report.json"));
+    assert_eq!(
+        bench.done(&with_tiny(&["compare", "quads", "--samples", "2"])).json(),
+        bench.json("out/report.json")
+    );
 }
 
 #[test]

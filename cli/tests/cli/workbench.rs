@@ -89,7 +89,8 @@ fn npy<T: npyz::Deserialize>(path: &Path) -> (Vec<u64>, Vec<T>) {
 impl Said {
     /// Stdout as the one JSON object it has to be.
     pub(crate) fn json(&self) -> Value {
-        let value: Value = serde_json::from_str(&self.stdout).unwrap_or_else(|e| panic!("{e}: {}", self.stdout));
+        let value: Value =
+            serde_json::from_str(&self.stdout).unwrap_or_else(|e| panic!("{e}: {}", self.stdout));
         assert!(value.is_object());
         value
     }
