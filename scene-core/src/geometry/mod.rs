@@ -17,5 +17,5 @@ pub use mesh::{MeshError, TriangleMesh};
 pub use repair::{Repairs, drop_unused_vertices, remove_faulty_faces};
 pub use scene::{Object, ObjectFlags, Scene, SceneError};
 pub use topology::{EdgeStatistics, EdgeTopology, Incidence, SilhouetteEdge, TopologyError};
-pub use triangulate::{PolygonFault, Repair, triangulate};
+pub use triangulate::{MAX_CROSSING, PolygonFault, Repair, triangulate};
 pub use weld::{Weld, weld};

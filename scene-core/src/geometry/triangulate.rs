@@ -11,7 +11,7 @@
 //! | touches itself at a corner or along an edge (a hole joined by a bridge) | the region it winds around |
 //! | winds around a region twice | that region once, [`Repair::Overlap`] |
 //! | a quad that crosses itself, or is folded | two triangles along its first diagonal, [`Repair::Folded`] |
-//! | any other that crosses itself, seen along its normal | refused: [`PolygonFault::Crosses`] |
+//! | any other that crosses itself, seen along its normal | the triangles of its corners whose middles it winds around, [`Repair::Crossing`]; refused beyond [`MAX_CROSSING`] corners, or if its parts cancel: [`PolygonFault::Crosses`] |
 //! | no area (collinear, fewer than three places) | nothing, [`Repair::NoArea`] |
 //! | not planar | the triangles of its projection, with the true corners |
 
@@ -30,13 +30,18 @@ pub enum Repair {
     Folded,
     /// It covers a part of itself twice.
     Overlap,
+    /// It crosses itself; near the crossings, its outline is only approximated.
+    Crossing,
 }
+
+/// Corners of the largest polygon that is mended if it crosses itself: mending takes O(n²) time.
+pub const MAX_CROSSING: usize = 4096;
 
 /// Why a polygon was refused.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum PolygonFault {
-    /// Two sides cross, so there is no inside.
-    #[error("the polygon of {corners} corners crosses itself")]
+    /// Sides cross, and what is inside cannot be told.
+    #[error("the polygon of {corners} corners crosses itself: split it")]
     Crosses {
         /// Its corners.
         corners: usize,
@@ -161,13 +166,13 @@ fn triangulate_flat(
         .collect();
     let mut conflict = false;
     let cdt = Cdt::try_bulk_load_cdt(points, sides.clone(), |_| conflict = true).map_err(|_| crosses)?;
-    if conflict {
+    if conflict && n > MAX_CROSSING {
         return Err(crosses);
     }
     if cdt.num_inner_faces() == 0 {
         return Ok(Some(Repair::NoArea));
     }
-    let winding = winding_numbers(&cdt, &sides);
+    let winding = if conflict { winding_of_middles(&cdt, polygon) } else { winding_numbers(&cdt, &sides) };
     let mut overlap = false;
     for face in cdt.inner_faces() {
         let w = winding[face.fix().index()];
@@ -179,7 +184,11 @@ fn triangulate_flat(
             _ => triangles.push([a, c, b]),
         }
     }
-    Ok(overlap.then_some(Repair::Overlap))
+    Ok(match (conflict, overlap) {
+        (true, _) => Some(Repair::Crossing),
+        (false, true) => Some(Repair::Overlap),
+        (false, false) => None,
+    })
 }
 
 /// The polygon's distinct places, the place of each corner, and the first corner at each place.
@@ -236,6 +245,27 @@ fn winding_numbers(cdt: &Cdt, sides: &[[usize; 2]]) -> Vec<i32> {
         }
     }
     winding.into_iter().map(|w| w.unwrap_or(0)).collect()
+}
+
+/// How often the polygon winds around the middle of each face: for polygons whose crossing sides are not all
+/// edges of the triangulation.
+fn winding_of_middles(cdt: &Cdt, polygon: &[DVec2]) -> Vec<i32> {
+    let mut winding = vec![0; cdt.num_all_faces()];
+    for face in cdt.inner_faces() {
+        let middle = face.center();
+        let middle = DVec2::new(middle.x, middle.y);
+        let next = polygon.iter().cycle().skip(1);
+        winding[face.fix().index()] = polygon
+            .iter()
+            .zip(next)
+            .map(|(&a, &b)| match (a.y <= middle.y, b.y <= middle.y) {
+                (true, false) if orient(a, b, middle) > 0.0 => 1,
+                (false, true) if orient(a, b, middle) < 0.0 => -1,
+                _ => 0,
+            })
+            .sum();
+    }
+    winding
 }
 
 #[cfg(test)]
@@ -377,15 +407,30 @@ mod tests {
     }
 
     #[test]
-    fn crossing_polygons_are_refused() {
+    fn crossing_polygons_are_mended() {
+        // A square with one side that crosses into a small loop.
+        let loops =
+            polygon(&[[0., 0.], [4., 0.], [4., 4.], [2., 4.], [1., 5.], [2., 5.], [1., 4.], [0., 4.]]);
+        let (triangles, repair) = run(&loops);
+        assert_eq!(repair, Some(Repair::Crossing));
+        let area: f64 = vector_areas(&loops, &triangles).iter().map(|a| a.length()).sum();
+        assert!((15.5..17.5).contains(&area), "{area}");
+    }
+
+    #[test]
+    fn what_cannot_be_mended_is_refused() {
         let star: Vec<_> = (0..5)
             .map(|i| {
                 let angle = (i * 2) as f32 * std::f32::consts::TAU / 5.0;
                 Vec3::new(angle.cos(), angle.sin(), 0.0)
             })
             .collect();
+        let star: Vec<_> = star.into_iter().cycle().take(5 * 1000).collect();
+        // Two lobes of equal area in opposite directions.
+        let eight = polygon(&[[0., 0.], [1., 1.], [2., 0.], [2., 1.], [1., 0.], [0., 1.]]);
         let mut triangles = vec![[7, 8, 9]];
-        assert_eq!(triangulate(&star, &mut triangles), Err(PolygonFault::Crosses { corners: 5 }));
+        assert_eq!(triangulate(&eight, &mut triangles), Err(PolygonFault::Crosses { corners: 6 }));
+        assert_eq!(triangulate(&star, &mut triangles), Err(PolygonFault::Crosses { corners: 5000 }));
         assert_eq!(triangles, [[7, 8, 9]]);
         let nan = [Vec3::ZERO, Vec3::X, Vec3::ONE, Vec3::NAN, Vec3::Y];
         assert_eq!(triangulate(&nan, &mut triangles), Err(PolygonFault::NotFinite { corner: 3 }));
