@@ -56,6 +56,8 @@ pub struct Lookup<'a> {
     pub light: &'a Light,
     /// Its maps.
     pub maps: &'a [ShadowMapView],
+    /// Casters that are in no map because no surface lies behind them; a free point may.
+    pub backdrops: &'a [&'a Object],
     /// [`crate::receiver_plane::plane_tolerance`].
     pub tolerance: f32,
 }
@@ -117,8 +119,28 @@ impl Lookup<'_> {
                     self.tolerance,
                 )
         });
-        if shadowed { 0.0 } else { 1.0 }
+        if shadowed || self.is_behind_backdrop(point) { 0.0 } else { 1.0 }
     }
+
+    /// Whether a backdrop hides the light from a free point, triangle by triangle: backdrops are few and flat,
+    /// and only points beyond all of the scene are behind one.
+    fn is_behind_backdrop(&self, point: Vec3) -> bool {
+        let light = self.light.center();
+        let mut triangles = self.backdrops.iter().flat_map(|object| object.triangles.clone());
+        triangles.any(|triangle| {
+            let corners = self.scene.corners(triangle);
+            is_behind(corners, point, light, self.tolerance) && meets(corners, point, light)
+        })
+    }
+}
+
+/// Whether the line from `point` towards the light passes between the corners, by the signs of the volumes it
+/// spans with the edges.
+fn meets(corners: [Vec3; 3], point: Vec3, light: LightPoint) -> bool {
+    let (direction, _) = light.ray_from(point);
+    let [a, b, c] = corners.map(|corner| corner - point);
+    let sides = [a.cross(b), b.cross(c), c.cross(a)].map(|normal| normal.dot(direction));
+    sides.iter().all(|&side| side >= 0.0) || sides.iter().all(|&side| side <= 0.0)
 }
 
 /// `shade.lookup`: V of every pixel that sees a surface, NaN elsewhere.

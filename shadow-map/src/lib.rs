@@ -8,6 +8,7 @@ mod technique;
 
 use glam::Vec3;
 use rayon::prelude::*;
+use scene_core::geometry::Object;
 use scene_core::{GBuffer, Light, Report, Scene, VisibilityImage};
 
 use cpu::{Lookup, ShadowMapView};
@@ -26,6 +27,7 @@ pub struct PreparedShadowMap<'a> {
     scene: &'a Scene,
     light: Light,
     maps: Vec<ShadowMapView>,
+    backdrops: Vec<&'a Object>,
     tolerance: f32,
 }
 
@@ -40,25 +42,32 @@ impl ShadowMap {
         let mut report = Report::default();
         let tolerance = receiver_plane::plane_tolerance(scene.bounds(), light);
         let (casters, views) = report.time("prepare.views", |_| {
-            let (casters, left_out) = light_views::relevant_casters(scene, light, tolerance);
-            let mut views = light_views::light_views(scene, light, &casters, self.params.skip);
-            views.skipped_casters = left_out;
+            let casters = light_views::relevant_casters(scene, light, tolerance);
+            let views = light_views::light_views(scene, light, &casters.drawn, self.params.skip);
             (casters, views)
         });
-        report.skip("casters", views.skipped_casters);
+        report.skip("casters", casters.backdrops.len() as u64);
         report.skip("faces", views.skipped_faces);
-        let maps = report
-            .time("prepare.maps", |_| cpu::render_maps(scene, &casters, &views.views, self.params.map_size));
+        let maps = report.time("prepare.maps", |_| {
+            cpu::render_maps(scene, &casters.drawn, &views.views, self.params.map_size)
+        });
         let texels = u64::from(self.params.map_size) * u64::from(self.params.map_size);
         // A depth and a triangle index a texel.
         report.bytes = maps.len() as u64 * texels * 8;
-        (PreparedShadowMap { scene, light: *light, maps, tolerance }, report)
+        let backdrops = casters.backdrops;
+        (PreparedShadowMap { scene, light: *light, maps, backdrops, tolerance }, report)
     }
 }
 
 impl PreparedShadowMap<'_> {
     fn lookup(&self) -> Lookup<'_> {
-        Lookup { scene: self.scene, light: &self.light, maps: &self.maps, tolerance: self.tolerance }
+        Lookup {
+            scene: self.scene,
+            light: &self.light,
+            maps: &self.maps,
+            backdrops: &self.backdrops,
+            tolerance: self.tolerance,
+        }
     }
 
     /// The maps, one a view.

@@ -123,15 +123,13 @@ impl LightView {
     }
 }
 
-/// The views of a light, and how many were left out because nothing is in them.
+/// The views of a light.
 #[derive(Clone, Debug, Default)]
 pub struct LightViews {
     /// The views; a point lies in at most one but for the shared borders of cube faces.
     pub views: Vec<LightView>,
-    /// Cube faces without casters.
+    /// Cube faces left out because they see no caster.
     pub skipped_faces: u64,
-    /// Objects that shadow nothing because nothing lies behind them.
-    pub skipped_casters: u64,
 }
 
 /// Chooses the views of `light`: one parallel view for a directional light, one perspective view where the
@@ -239,24 +237,30 @@ fn smallest_extent(bounds: Aabb) -> f32 {
     (bounds.magnitude() * MARGIN).max(f32::MIN_POSITIVE * 1e6)
 }
 
-/// Casters that can shadow something, and how many cannot: an object whose triangles all lie in one plane,
-/// with the whole scene on the light's side of it, shadows nothing (but its own back, which is dark by its
-/// normal). `tolerance` is the distance below which a point does not count as behind a plane; the comparison
+/// The casters of a scene, told apart by whether anything lies behind them.
+#[derive(Clone, Debug, Default)]
+pub struct Casters<'a> {
+    /// Those that the maps must hold.
+    pub drawn: Vec<&'a Object>,
+    /// Flat ones with the whole scene on the light's side: they shadow no surface, only free points beyond.
+    pub backdrops: Vec<&'a Object>,
+}
+
+/// Tells casters from backdrops: an object whose triangles all lie in one plane, with the whole scene on the
+/// light's side of it, shadows no surface (but its own back, which is dark by its normal). `tolerance` is the
+/// distance below which a point does not count as behind a plane; the comparison of
 /// [`crate::receiver_plane`] uses the same, so that leaving such a caster out changes no pixel.
-pub fn relevant_casters<'a>(scene: &'a Scene, light: &Light, tolerance: f32) -> (Vec<&'a Object>, u64) {
-    let mut left_out = 0;
-    let mut casters = Vec::new();
-    for object in scene.objects().iter().filter(|o| o.flags.casts && !o.triangles.is_empty()) {
-        if nothing_behind(scene, light, object, tolerance) {
-            left_out += 1;
-        } else {
-            casters.push(object);
-        }
-    }
-    (casters, left_out)
+pub fn relevant_casters<'a>(scene: &'a Scene, light: &Light, tolerance: f32) -> Casters<'a> {
+    let casters = scene.objects().iter().filter(|o| o.flags.casts && !o.triangles.is_empty());
+    let (backdrops, drawn) = casters.partition(|object| nothing_behind(scene, light, object, tolerance));
+    Casters { drawn, backdrops }
 }
 
 fn nothing_behind(scene: &Scene, light: &Light, object: &Object, tolerance: f32) -> bool {
+    // A mask's holes would have to be looked up for free points; maps do that already.
+    if object.alpha.is_some() {
+        return false;
+    }
     let normal_of = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a).try_normalize();
     let Some((anchor, normal)) =
         object.triangles.clone().find_map(|t| normal_of(scene.corners(t)).map(|n| (scene.corners(t)[0], n)))
@@ -327,13 +331,13 @@ mod tests {
     fn the_ground_under_everything_is_no_caster() {
         let scene = scene_of(&[quad_at(0.0, 50.0), quad_at(1.0, 1.0)]);
         for light in &LIGHTS[..2] {
-            let (casters, left_out) = relevant_casters(&scene, light, 1e-5);
-            assert_eq!((casters.len(), left_out), (1, 1));
+            let casters = relevant_casters(&scene, light, 1e-5);
+            assert_eq!((casters.drawn.len(), casters.backdrops.len()), (1, 1));
         }
         // From below, the ground hides everything.
         let below = Light::Point { position: Vec3::new(0.0, -3.0, 0.0) };
-        assert_eq!(relevant_casters(&scene, &below, 1e-5).0.len(), 1);
-        assert_eq!(relevant_casters(&scene, &below, 1e-5).0[0].bounds.max.y, 0.0);
+        let casters = relevant_casters(&scene, &below, 1e-5).drawn;
+        assert_eq!((casters.len(), casters[0].bounds.max.y), (1, 0.0));
     }
 
     #[test]

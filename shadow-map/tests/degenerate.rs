@@ -73,12 +73,14 @@ fn free_points_that_are_not_finite_stay_unknown() {
 
 #[test]
 fn skipping_never_changes_the_image() {
-    // A light between two walls of a corridor: some cube faces are empty.
+    // A light between floor and ceiling: the faces to the sides are empty.
     let mut scene =
-        triangle([Vec3::new(-3.0, -1.0, -3.0), Vec3::new(3.0, -1.0, -3.0), Vec3::new(0.0, -1.0, 3.0)]);
-    let small = TriangleMesh::new("s", vec![Vec3::ZERO, Vec3::X, Vec3::Z], vec![[0, 1, 2]]);
-    let place = Affine3A::from_translation(Vec3::new(-0.5, -0.5, -0.5));
-    scene.add(&small, place, ObjectFlags::default()).expect("finite");
+        triangle([Vec3::new(-0.5, -1.0, -0.5), Vec3::new(0.5, -1.0, -0.5), Vec3::new(0.0, -1.0, 0.5)]);
+    for height in [-0.8, 1.0] {
+        let small = TriangleMesh::new("s", vec![Vec3::ZERO, Vec3::X * 0.2, Vec3::Z * 0.2], vec![[0, 1, 2]]);
+        let place = Affine3A::from_translation(Vec3::new(0.0, height, -0.2));
+        scene.add(&small, place, ObjectFlags::default()).expect("finite");
+    }
     let gbuffer = raster::render_gbuffer(&scene, &CAMERA);
     let light = Light::Point { position: Vec3::new(0.0, 0.1, 0.0) };
     let mut images = Vec::new();

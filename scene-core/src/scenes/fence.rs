@@ -28,11 +28,11 @@ const THICKNESS: f32 = 0.03;
 
 fn build(values: &Values<'_>, _time: f32) -> Stage {
     let half = values.real("light");
-    let center = Vec3::new(-1.6, 3.2, -4.2);
+    let center = Vec3::new(-1.3, 3.7, -4.0);
     let u = Vec3::Y.cross(center).normalize() * half;
     let light = Light::Rect { center, half_u: u, half_v: u.cross(center.normalize()) };
     let mut stage =
-        Stage::new(camera(Vec3::new(-0.9, 2.5, 5.0), Vec3::new(0.15, 0.35, 0.35), 42.0, 0.1), light);
+        Stage::new(camera(Vec3::new(-0.6, 2.6, 5.4), Vec3::new(0.05, 0.3, 0.7), 44.0, 0.1), light);
     stage.add("ground", cuboid(Vec3::new(-4.0, -0.1, -4.0), Vec3::new(4.0, 0.0, 4.0)));
 
     let (x, z) = (LENGTH * 0.5, THICKNESS * 0.5);

@@ -26,8 +26,8 @@ const TOP: f32 = 2.4;
 fn build(values: &Values<'_>, _time: f32) -> Stage {
     let half = values.real("light");
     let light =
-        Light::Rect { center: Vec3::new(-1.5, 5.6, 0.9), half_u: Vec3::X * half, half_v: Vec3::Z * half };
-    let mut stage = Stage::new(camera(Vec3::new(3.2, 3.2, 5.4), Vec3::new(0.2, 0.9, 0.0), 38.0, 0.1), light);
+        Light::Rect { center: Vec3::new(-0.9, 6.0, 0.5), half_u: Vec3::X * half, half_v: Vec3::Z * half };
+    let mut stage = Stage::new(camera(Vec3::new(3.0, 3.6, 5.4), Vec3::new(0.3, 0.8, -0.1), 40.0, 0.1), light);
     stage.add("floor", cuboid(Vec3::new(-4.0, -0.1, -4.0), Vec3::new(4.0, 0.0, 4.0)));
     let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
     let posts = corners.map(|(x, z)| {

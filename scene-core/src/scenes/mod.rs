@@ -11,13 +11,19 @@ mod cornell;
 mod cylinder;
 mod edges;
 mod fence;
+mod forest;
 mod knot;
 mod layers;
+mod log_cabin;
+mod park;
+mod plants;
+mod pool;
 mod quads;
 mod random;
 mod shapes;
 mod spec;
 mod stage;
+mod street;
 
 use glam::Vec3;
 
@@ -64,6 +70,11 @@ static ALL: &[BuiltIn] = &[
     ball::SCENE,
     chess::SCENE,
     fence::SCENE,
+    log_cabin::SCENE,
+    pool::SCENE,
+    street::SCENE,
+    park::SCENE,
+    forest::SCENE,
     knot::SCENE,
     layers::SCENE,
     edges::SCENE,

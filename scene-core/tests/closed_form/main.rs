@@ -23,10 +23,6 @@ impl Analytic {
 }
 
 impl Occlusion for Analytic {
-    fn shadow_origin(&self, position: Vec3, _normal: Vec3) -> Vec3 {
-        position
-    }
-
     fn occluded_from(&self, origin: Vec3, targets: &[LightPoint], blocked: &mut [bool]) {
         for (target, blocked) in targets.iter().zip(blocked) {
             let (direction, end) = target.ray_from(origin);
