@@ -62,6 +62,10 @@ pub(crate) enum Command {
     /// Techniques with their settings, units, ranges, defaults and presets
     Techniques(TechniquesArgs),
     /// Built-in scenes and their parameters
+    #[command(after_help = "\
+Examples:
+  gnomon scenes
+  gnomon compare ball:height=1.2 --time 0.4      a scene with a parameter set, after 0.4 seconds")]
     Scenes,
 }
 

@@ -106,7 +106,7 @@ impl Layout {
             format!("  {:>6} penumbra", percent(truth.shares.penumbra)),
             format!("  {:>6} umbra", percent(truth.shares.umbra)),
             String::new(),
-            format!("its own error is {}", error_text(truth.noise)),
+            format!("noise of ground truth {}", error_text(truth.noise)),
         ];
         for (i, line) in lines.iter().enumerate() {
             let y = top + i as u32 * TextStyle::Body.line_height();

@@ -35,13 +35,18 @@ pub(crate) fn linear_from_oklch(lightness: f32, chroma: f32, hue_deg: f32) -> Ve
     )
 }
 
-/// The muted albedo of an object, stable by its id: the first is nearly grey, then hues in golden-angle steps,
-/// so that neighbours in the list never look alike.
+/// The muted albedo of an object, stable by its id: the first is nearly grey; then hue goes in golden-angle steps
+/// and lightness in steps of the golden ratio, so that neighbours in the list never look alike.
 pub(crate) fn object_albedo(id: u32) -> Vec3 {
     const GOLDEN_ANGLE_DEG: f32 = 137.508;
-    let chroma = if id == 0 { 0.012 } else { 0.055 };
-    let hue_deg = (80.0 + (id % 4096) as f32 * GOLDEN_ANGLE_DEG) % 360.0;
-    linear_from_oklch(0.80, chroma, hue_deg)
+    const GOLDEN_RATIO: f32 = 0.618_034;
+    if id == 0 {
+        return linear_from_oklch(0.80, 0.012, 80.0);
+    }
+    // The palette repeats long after anyone could tell.
+    let step = (id % 4096) as f32;
+    let lightness = 0.64 + 0.20 * (step * GOLDEN_RATIO).fract();
+    linear_from_oklch(lightness, 0.05, (80.0 + step * GOLDEN_ANGLE_DEG) % 360.0)
 }
 
 #[cfg(test)]

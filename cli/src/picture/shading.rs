@@ -16,10 +16,10 @@ use super::colour::{Rgb, object_albedo, srgb_from_linear};
 /// Colour and strength of the light relative to the sky: a warm key.
 const KEY: Vec3 = Vec3::new(1.30, 1.22, 1.08);
 /// Light from straight above and from straight below.
-const SKY: Vec3 = Vec3::new(0.26, 0.30, 0.37);
-const GROUND: Vec3 = Vec3::new(0.13, 0.12, 0.11);
+const SKY: Vec3 = Vec3::new(0.19, 0.22, 0.28);
+const GROUND: Vec3 = Vec3::new(0.10, 0.09, 0.08);
 /// Light at the camera, times n·v.
-const HEADLIGHT: f32 = 0.10;
+const HEADLIGHT: f32 = 0.08;
 /// The share of reached pixels that are no brighter than full exposure: what lies nearer to the light rolls off.
 const EXPOSED_SHARE: f32 = 0.90;
 /// What a surface without a visibility looks like; no technique should show it.
