@@ -9,14 +9,8 @@ mod sampled;
 mod tiles;
 mod valid;
 
-pub use exact::{CasterSearch, ExactError, exact_reference};
-pub use occlusion::Occlusion;
+pub use exact::{ExactError, exact_reference};
+pub use occlusion::{CasterSearch, Occlusion};
 pub use sampled::{ReferenceSettings, reference};
 pub use tiles::{Cancelled, Reference, no_progress};
 pub use valid::valid_pixels;
-
-/// Stand-in.
-fn shadow_origin(position: glam::Vec3, normal: glam::Vec3, magnitude: f32) -> glam::Vec3 {
-    let largest = position.abs().max_element().max(magnitude);
-    position + normal * (largest / (1 << 21) as f32)
-}

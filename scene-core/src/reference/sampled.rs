@@ -5,8 +5,9 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use super::Occlusion;
 use super::tiles::{Cancelled, Estimate, Reference, estimate_tiles};
-use super::{Occlusion, shadow_origin};
+use crate::bvh::shadow_origin;
 use crate::light::LightPoint;
 use crate::light::sampling::{LightView, SampleKey, Strata};
 use crate::{GBuffer, Light, Scene};

@@ -4,6 +4,7 @@
 //! shown by planted faults.
 
 mod formulas;
+mod traced;
 
 use glam::{DVec2, DVec3, Vec3};
 use gnomon_scene_core::light::LightPoint;
@@ -124,20 +125,21 @@ fn agreement(
     if fine { Ok(found) } else { Err(format!("{found:?}")) }
 }
 
-fn sample(casters: &impl Occlusion, light: &Light, gbuffer: &GBuffer) -> Reference {
+fn sample(scene: &Scene, casters: &impl Occlusion, light: &Light, gbuffer: &GBuffer) -> Reference {
     let settings = ReferenceSettings { samples: SAMPLES, seed: 3 };
     light.validate().unwrap();
-    reference(&Scene::new(), casters, light, gbuffer, &settings, &no_progress).unwrap()
+    reference(scene, casters, light, gbuffer, &settings, &no_progress).unwrap()
 }
 
 #[track_caller]
 fn assert_agreement(
+    scene: &Scene,
     casters: &impl Occlusion,
     light: &Light,
     gbuffer: &GBuffer,
     truth: impl Fn(DVec3) -> f64,
 ) {
-    match agreement(truth, gbuffer, &sample(casters, light, gbuffer)) {
+    match agreement(truth, gbuffer, &sample(scene, casters, light, gbuffer)) {
         Ok(found) => println!("{found:?}"),
         Err(why) => panic!("{why}"),
     }
@@ -149,7 +151,7 @@ fn assert_agreement(
 fn half_plane_under_a_rect_is_linear() {
     let light = Light::Rect { center: Vec3::Y * 2.0, half_u: Vec3::X * 0.5, half_v: Vec3::Z * 1.5 };
     let casters = sheet(1.0, |p| p.x < 0.0);
-    assert_agreement(&casters, &light, &floor(3000, 0.7), |x| (0.5 + x.x).clamp(0.0, 1.0));
+    assert_agreement(&Scene::new(), &casters, &light, &floor(3000, 0.7), |x| (0.5 + x.x).clamp(0.0, 1.0));
 }
 
 /// The same edge across a skewed light: a clipped parallelogram.
@@ -163,7 +165,7 @@ fn half_plane_under_a_skewed_rect_is_a_clipped_polygon() {
     let corners =
         [DVec2::new(0.7, -0.4), DVec2::new(0.1, -0.8), DVec2::new(-0.7, 0.4), DVec2::new(-0.1, 0.8)];
     let casters = sheet(1.0, |p| p.x < 0.0);
-    assert_agreement(&casters, &light, &floor(3000, 0.8), |x| {
+    assert_agreement(&Scene::new(), &casters, &light, &floor(3000, 0.8), |x| {
         let seen = formulas::clip(&corners, |p| p.x + x.x);
         formulas::area(&seen) / formulas::area(&corners)
     });
@@ -191,7 +193,7 @@ fn square_over_plane() -> (Analytic, Light, impl Fn(DVec3) -> f64) {
 #[test]
 fn square_under_a_square_is_a_clipped_polygon() {
     let (casters, light, truth) = square_over_plane();
-    assert_agreement(&casters, &light, &floor(3000, 1.2), truth);
+    assert_agreement(&Scene::new(), &casters, &light, &floor(3000, 1.2), truth);
 }
 
 /// A disk of radius 0.3 at height 1 under a disk of radius 0.5 at height 2: two circles' lens.
@@ -199,7 +201,7 @@ fn square_under_a_square_is_a_clipped_polygon() {
 fn disk_under_a_disk_is_a_lens() {
     let light = Light::Disk { center: Vec3::Y * 2.0, normal: Vec3::NEG_Y * 3.0, radius: 0.5 };
     let casters = sheet(1.0, |p| p.length() < 0.3);
-    assert_agreement(&casters, &light, &floor(3000, 1.0), |x| {
+    assert_agreement(&Scene::new(), &casters, &light, &floor(3000, 1.0), |x| {
         // The caster's image: radius 0.6 about −x.
         1.0 - formulas::lens(0.5, 0.6, x.length()) / (std::f64::consts::PI * 0.25)
     });
@@ -220,7 +222,7 @@ fn ball_under_a_sphere_is_two_caps() {
     for (radius, reach) in [(0.9, 1.3), (0.4, 1.0)] {
         let light = Light::Sphere { center: Vec3::new(0.0, 3.0, 0.2), radius: radius as f32 };
         let gbuffer = floor(3000, reach);
-        assert_agreement(&ball(BALL.0, BALL.1), &light, &gbuffer, |x| {
+        assert_agreement(&Scene::new(), &ball(BALL.0, BALL.1), &light, &gbuffer, |x| {
             ball_truth(x, DVec3::new(0.0, 3.0, f64::from(0.2f32)), f64::from(radius as f32))
         });
     }
@@ -234,7 +236,7 @@ fn scale_does_not_matter() {
     let mut gbuffer = floor(3000, 1.0);
     gbuffer.position.iter_mut().for_each(|p| *p *= scale);
     let scale = f64::from(scale);
-    assert_agreement(&ball(BALL.0 * scale, BALL.1 * scale), &light, &gbuffer, |x| {
+    assert_agreement(&Scene::new(), &ball(BALL.0 * scale, BALL.1 * scale), &light, &gbuffer, |x| {
         ball_truth(x / scale, DVec3::Y * 3.0, 0.5)
     });
 }
@@ -252,7 +254,7 @@ fn half_plane_under_the_sun_is_a_segment() {
         let (sun, radius) = (-direction.as_dvec3().normalize(), f64::from(angular_radius));
         let side = |x: DVec3| DVec3::new(2.0, x.x - edge, 0.0).normalize();
         let gbuffer = floor(3000, half_side);
-        assert_agreement(&casters, &light, &gbuffer, |x| {
+        assert_agreement(&Scene::new(), &casters, &light, &gbuffer, |x| {
             let hemisphere = std::f64::consts::FRAC_PI_2;
             formulas::common_caps(radius, hemisphere, sun.angle_between(side(x))) / formulas::cap(radius)
         });
@@ -273,7 +275,7 @@ fn half_plane_under_the_sun_is_a_segment() {
 fn planted_faults_are_noticed() {
     let (casters, light, truth) = square_over_plane();
     let gbuffer = floor(3000, 1.2);
-    let honest = sample(&casters, &light, &gbuffer);
+    let honest = sample(&Scene::new(), &casters, &light, &gbuffer);
     assert!(agreement(&truth, &gbuffer, &honest).is_ok());
 
     let spoiled = |spoil: &dyn Fn(&mut f32, &mut f32)| {
@@ -305,11 +307,13 @@ fn planted_faults_are_noticed() {
 
     // Light, caster and measure wrong by a per cent or so.
     let larger = Light::Rect { center: Vec3::Y * 3.0, half_u: Vec3::X * 0.81, half_v: Vec3::Z * 0.8 };
-    assert!(agreement(&truth, &gbuffer, &sample(&casters, &larger, &gbuffer)).is_err());
+    assert!(agreement(&truth, &gbuffer, &sample(&Scene::new(), &casters, &larger, &gbuffer)).is_err());
     let higher = sheet(1.01, |p| DVec2::from_angle(-0.5).rotate(p).abs().max_element() < 0.25);
-    assert!(agreement(&truth, &gbuffer, &sample(&higher, &light, &gbuffer)).is_err());
+    assert!(agreement(&truth, &gbuffer, &sample(&Scene::new(), &higher, &light, &gbuffer)).is_err());
     let wide = |x: DVec3| ball_truth(x, DVec3::Y * 3.0, 0.9);
     let disk = Light::Disk { center: Vec3::Y * 3.0, normal: Vec3::Y, radius: 0.9 };
     let gbuffer = floor(3000, 1.3);
-    assert!(agreement(wide, &gbuffer, &sample(&ball(BALL.0, BALL.1), &disk, &gbuffer)).is_err());
+    assert!(
+        agreement(wide, &gbuffer, &sample(&Scene::new(), &ball(BALL.0, BALL.1), &disk, &gbuffer)).is_err()
+    );
 }

@@ -18,16 +18,9 @@ use thiserror::Error;
 use self::cone::{Cone, Outline};
 use self::union_area::UnionArea;
 use super::tiles::{Estimate, Reference, estimate_tiles};
-use super::{Cancelled, Occlusion, ReferenceSettings, reference, shadow_origin};
-use crate::geometry::Aabb;
+use super::{Cancelled, CasterSearch, Occlusion, ReferenceSettings, reference};
+use crate::bvh::shadow_origin;
 use crate::{GBuffer, Light, Scene};
-
-/// What exact truth asks of a spatial index.
-pub trait CasterSearch: Sync {
-    /// Walks nested boxes from the outside in: `enter` says of each whether to look inside, `triangle` is given
-    /// every triangle (an index into [`Scene::triangles`]) that throws shadows in the boxes entered.
-    fn visit(&self, enter: impl FnMut(Aabb) -> bool, triangle: impl FnMut(u32));
-}
 
 /// Why there is no exact truth.
 #[derive(Clone, Debug, Error, PartialEq)]

@@ -2,7 +2,7 @@ use glam::{Affine3A, Vec3};
 
 use super::*;
 use crate::TriangleMesh;
-use crate::geometry::{AlphaMask, ObjectFlags};
+use crate::geometry::{Aabb, AlphaMask, ObjectFlags};
 use crate::light::LightPoint;
 use crate::light::sampling::SampleKey;
 use crate::reference::no_progress;
