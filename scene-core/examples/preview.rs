@@ -9,17 +9,12 @@
 
 use std::error::Error;
 use std::f32::consts::TAU;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use glam::Vec3;
-use gnomon_scene_core::light::LightPoint;
+use gnomon_scene_core::bvh::{Bvh, shadow_origin};
 use gnomon_scene_core::raster::render_gbuffer;
-use gnomon_scene_core::{GBuffer, Light, Scene, scenes};
-use obvhs::BvhBuildParams;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2_from_tris;
-use obvhs::ray::Ray;
-use obvhs::triangle::Triangle;
+use gnomon_scene_core::{GBuffer, Light, scenes};
 use rayon::prelude::*;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -40,10 +35,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let setup = scenes::build(spec, time)?;
     let built = start.elapsed();
     let gbuffer = render_gbuffer(&setup.scene, &setup.camera);
-    let shadows = Shadows::new(&setup.scene);
+    let casters = Bvh::casters(&setup.scene);
+    let magnitude = setup.scene.bounds().magnitude();
     let pixels: Vec<[u8; 3]> = (0..gbuffer.pixel_count())
         .into_par_iter()
-        .map(|pixel| shade(&gbuffer, pixel, &setup.lights[0], &shadows))
+        .map(|pixel| shade(&gbuffer, pixel, &setup.lights[0], &casters, magnitude))
         .collect();
     image::save_buffer(file, pixels.as_flattened(), gbuffer.width, gbuffer.height, image::ColorType::Rgb8)?;
     println!(
@@ -57,14 +53,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn shade(gbuffer: &GBuffer, pixel: usize, light: &Light, shadows: &Shadows<'_>) -> [u8; 3] {
+fn shade(gbuffer: &GBuffer, pixel: usize, light: &Light, casters: &Bvh, magnitude: f32) -> [u8; 3] {
     if !gbuffer.is_seen(pixel) {
         return [168, 190, 214];
     }
     let (position, normal) = (gbuffer.position[pixel], gbuffer.normal[pixel]);
     let (towards, _) = light.center().ray_from(position);
     let facing = normal.dot(towards.normalize_or_zero()).max(0.0);
-    let lit = facing > 0.0 && light.reaches(position) && !shadows.blocked(position, normal, light.center());
+    let origin = shadow_origin(position, normal, magnitude);
+    let lit = facing > 0.0 && light.reaches(position) && !casters.is_occluded(origin, light.center());
     let ambient = 0.2 + 0.08 * normal.y;
     let shaded = colour(gbuffer.object[pixel]) * (ambient + if lit { 0.85 * facing } else { 0.0 });
     // Linear light to sRGB, near enough.
@@ -79,45 +76,4 @@ fn colour(object: u32) -> Vec3 {
     let hue = (object as f32 * 0.618_034).fract();
     let channel = |shift: f32| 0.62 + 0.22 * ((hue + shift) * TAU).cos();
     Vec3::new(channel(0.0), channel(2.0 / 3.0), channel(1.0 / 3.0))
-}
-
-struct Shadows<'a> {
-    scene: &'a Scene,
-    triangles: Vec<Triangle>,
-    tree: Bvh2,
-}
-
-impl<'a> Shadows<'a> {
-    fn new(scene: &'a Scene) -> Self {
-        let corners = (0..scene.triangles().len()).map(|i| scene.corners(i).map(Into::into));
-        let triangles: Vec<_> = corners.map(|[v0, v1, v2]| Triangle { v0, v1, v2 }).collect();
-        let tree = build_bvh2_from_tris(&triangles, BvhBuildParams::fast_build(), &mut Duration::default());
-        Self { scene, triangles, tree }
-    }
-
-    fn blocked(&self, position: Vec3, normal: Vec3, light: LightPoint) -> bool {
-        // The origin is lifted by a few units in the last place of the largest coordinate there is.
-        let lift = self.scene.bounds().magnitude() * 2f32.powi(-21);
-        let origin = position + normal * lift;
-        let (direction, end) = light.ray_from(origin);
-        let ray = Ray::new(origin.into(), direction.into(), 0.0, end.min(f32::MAX));
-        let mut blocked = false;
-        self.tree.ray_traverse_anyhit(ray, |ray, node| {
-            let triangle = self.tree.primitive_indices[node] as usize;
-            let t = self.triangles[triangle].intersect(ray);
-            blocked |= t > 0.0 && t < end && self.is_solid(triangle, (ray.origin + ray.direction * t).into());
-        });
-        blocked
-    }
-
-    fn is_solid(&self, triangle: usize, point: Vec3) -> bool {
-        let object = &self.scene.objects()[self.scene.object_of(triangle) as usize];
-        let Some(mask) = &object.alpha else { return object.flags.casts };
-        let [a, b, c] = self.scene.corners(triangle);
-        let normal = (b - a).cross(c - a);
-        let share = |u: Vec3, v: Vec3| u.cross(v).dot(normal) / normal.length_squared();
-        let (v, w) = (share(point - a, c - a), share(b - a, point - a));
-        let [uv_a, uv_b, uv_c] = self.scene.triangles()[triangle].map(|i| self.scene.uvs()[i as usize]);
-        object.flags.casts && mask.is_solid(uv_a * (1.0 - v - w) + uv_b * v + uv_c * w)
-    }
 }
