@@ -187,6 +187,8 @@ fn survive(folder: &Path, file: &str, entry: &str, seed: &[u8]) {
     let (mut loaded, mut slowest) = (0, Duration::ZERO);
     for number in 0..MUTANTS_PER_SEED {
         let mutant = mutate(seed, &mut random);
+        // A new file each time: some file systems write to the disk at once what replaces a file's contents.
+        fs::remove_file(&path).unwrap();
         fs::write(&path, &mutant).unwrap();
         let start = Instant::now();
         let outcome = catch_unwind(AssertUnwindSafe(|| load_setup(&folder.join(entry))));
