@@ -196,8 +196,8 @@ mod tests {
     fn thin_is_not_degenerate() {
         let far = Vec3::splat(1e6);
         let next = Vec3::new(1e6, 1e6, 1e6_f32.next_up());
-        let m = TriangleMesh::new("", vec![far, next, far + Vec3::X], vec![[0, 1, 2]]);
-        assert_eq!(remove_faulty_faces(&mut m.clone()), Repairs::default());
+        let mut m = TriangleMesh::new("", vec![far, next, far + Vec3::X], vec![[0, 1, 2]]);
+        assert_eq!(remove_faulty_faces(&mut m), Repairs::default());
     }
 
     #[test]

@@ -253,9 +253,9 @@ pub fn framed_camera(bounds: Aabb, up: UpAxis, width: u32, height: u32) -> Resul
 }
 
 /// The near plane of a camera that looks at something `distance` away: a hundredth of it. Depth is a float
-/// and reversed, so a small one costs no precision.
+/// and reversed, so a small one costs no precision. 1 if there is no distance, which is a fault of its own.
 pub(super) fn default_near(distance: f32) -> f32 {
-    distance * 0.01
+    if distance > 0.0 { distance * 0.01 } else { 1.0 }
 }
 
 /// Gives `setup` what it lacks: `camera` if there is one, else the rule's, and the rule's light if there is

@@ -8,6 +8,10 @@ use image::{DynamicImage, ImageReader};
 use super::{Limits, LoadError, file};
 use crate::geometry::{AlphaMask, Wrap};
 
+/// Deflate holds at most 1032 bytes in one, and a byte eight texels of one bit; JPEG holds fewer. So what a
+/// decoder allocates is bounded by what it is given.
+const MOST_TEXELS_PER_BYTE: u64 = 8 * 1032;
+
 /// Which channel of a texture says what is solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Channel {
@@ -51,6 +55,12 @@ impl Texture {
             return Err(format!(
                 "the picture is {width} × {height}, {texels} texels: the limit is {}",
                 limits.texels
+            ));
+        }
+        if texels > MOST_TEXELS_PER_BYTE * bytes.len() as u64 {
+            return Err(format!(
+                "the picture is {width} × {height}: more than its {} bytes can hold",
+                bytes.len()
             ));
         }
         let picture = reader.decode().map_err(|e| broken(&e))?;

@@ -113,7 +113,7 @@ pub fn exr(path: &Path, values: &[f32], width: u32, height: u32) -> Result<(), W
     self::bytes(path, &encoded.into_inner())
 }
 
-/// Writes a NumPy array of float32, H × W.
+/// Writes a `NumPy` array of float32, H × W.
 ///
 /// # Errors
 /// [`WriteError::Size`] unless there are `width` × `height` values, [`WriteError::Io`].
@@ -122,7 +122,7 @@ pub fn npy_f32(path: &Path, values: &[f32], width: u32, height: u32) -> Result<(
     npy(path, values.iter().copied(), &[height.into(), width.into()])
 }
 
-/// Writes a NumPy array of bool, H × W.
+/// Writes a `NumPy` array of bool, H × W.
 ///
 /// # Errors
 /// [`WriteError::Size`] unless there are `width` × `height` values, [`WriteError::Io`].
@@ -131,7 +131,7 @@ pub fn npy_bool(path: &Path, values: &[bool], width: u32, height: u32) -> Result
     npy(path, values.iter().copied(), &[height.into(), width.into()])
 }
 
-/// Writes a NumPy array of float32, H × W × 3.
+/// Writes a `NumPy` array of float32, H × W × 3.
 ///
 /// # Errors
 /// [`WriteError::Size`] unless there are `width` × `height` vectors, [`WriteError::Io`].

@@ -123,7 +123,7 @@ fn local_transform(document: &Document<'_>, node: &json::Node, name: &str) -> Re
         DAffine3::from_mat4(DMat4::from_cols_array(&matrix.map(f64::from)))
     } else {
         let rotation = node.rotation.map_or(DQuat::IDENTITY, |r| DQuat::from_array(r.0.map(f64::from)));
-        if !(rotation.length_squared() > 0.0) {
+        if rotation.length_squared() == 0.0 {
             return Err(document.fault(name, "its rotation has no length"));
         }
         DAffine3::from_scale_rotation_translation(
@@ -185,7 +185,7 @@ fn camera(
         width,
         height: DEFAULT_SIDE,
     };
-    camera.validate().map_err(|fault| document.fault(name, fault.to_string()))?;
+    camera.validate().map_err(|fault| document.fault(name, fault.to_string().replace("camera.", "")))?;
     Ok(Some(camera))
 }
 
@@ -214,6 +214,6 @@ fn light(
             return Err(document.fault(name, "type is none of directional, point and spot"));
         }
     };
-    light.validate().map_err(|fault| document.fault(name, fault.to_string()))?;
+    light.validate().map_err(|fault| document.fault(name, fault.to_string().replace("light.", "")))?;
     Ok(light)
 }

@@ -42,8 +42,13 @@ pub(super) fn load(path: &Path, limits: &Limits) -> Result<MeshFile, LoadError> 
         at_line(scan::locate(&text).unwrap_or((1, ObjFault::Statement(error.to_string()))))
     })?;
     let mut library = library.into_inner();
+    let within = |element: String, source| LoadError::Within {
+        path: path.to_owned(),
+        element,
+        source: Box::new(source),
+    };
     if let Some(error) = library.error {
-        return Err(error);
+        return Err(within("mtllib".to_owned(), error));
     }
 
     let mut loaded = MeshFile { notes: std::mem::take(&mut library.notes), ..Default::default() };
@@ -61,7 +66,8 @@ pub(super) fn load(path: &Path, limits: &Limits) -> Result<MeshFile, LoadError> 
         }
         let mut mask = None;
         if let Some(id) = model.mesh.material_id {
-            mask = library.mask(id)?;
+            let name = format!("usemtl {}", library.materials.get(id).map_or("", |m| &m.name));
+            mask = library.mask(id).map_err(|error| within(name, error))?;
         }
         let (mut mesh, masked) = faces.mesh(model.mesh, mask, &mut loaded.notes, &model.name)?;
         // A change of material makes a new model to tobj; it is the same object unless masks differ.

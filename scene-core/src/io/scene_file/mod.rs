@@ -40,6 +40,7 @@ use self::schema::SceneFile;
 use super::parts::MeshFile;
 use super::{LoadError, LoadOptions, Progress, UpAxis, file, framing};
 use crate::geometry::ObjectFlags;
+use crate::light::LightError;
 use crate::{Scene, SceneSetup};
 
 /// Reads a scene file and the meshes it names.
@@ -60,7 +61,11 @@ pub(super) fn load(path: &Path, options: &LoadOptions<'_>) -> Result<SceneSetup,
         let name = if scene_file.light.is_some() { "light".to_owned() } else { format!("lights[{index}]") };
         let light = convert::light(entry)
             .map_err(|(field, message)| element_fault(format!("{name}.{field}"), message))?;
-        light.validate().map_err(|fault| element_fault(name, fault.to_string()))?;
+        // The light's own messages say "light.radius"; here there may be several.
+        let at_light = |fault: LightError| fault.to_string().replace("light.", &format!("{name}."));
+        light
+            .validate()
+            .map_err(|fault| LoadError::File { path: path.to_owned(), message: at_light(fault) })?;
         lights.push(light);
     }
     let (scene, mut notes) = load_meshes(path, &scene_file, options)?;
@@ -182,10 +187,10 @@ pub(super) fn json_message(field: &str, error: &serde_json::Error) -> String {
     with_field(field, message)
 }
 
-/// `message` behind the field's name; "." and "?" are those of the whole file and of the unknown.
+/// `message` behind the field's name; "." stands for the whole file and "?" for what is unknown.
 fn with_field(field: &str, message: &str) -> String {
-    match field {
-        "." | "?" | "" => message.to_owned(),
+    match field.trim_end_matches('?').trim_end_matches('.') {
+        "" => message.to_owned(),
         field => format!("{field}: {message}"),
     }
 }
