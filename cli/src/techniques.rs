@@ -6,7 +6,7 @@ use crate::error::CliError;
 
 /// Every technique, in the order of the tables.
 pub(crate) fn all() -> [&'static dyn TechniqueFactory; 1] {
-    [gnomon_shadow_map::FACTORY]
+    [&gnomon_shadow_map::Factory]
 }
 
 /// The technique called `name`.
