@@ -76,7 +76,7 @@ fn skipping_never_changes_the_image() {
     // A light between floor and ceiling: the faces to the sides are empty.
     let mut scene =
         triangle([Vec3::new(-0.5, -1.0, -0.5), Vec3::new(0.5, -1.0, -0.5), Vec3::new(0.0, -1.0, 0.5)]);
-    for height in [-0.8, 1.0] {
+    for height in [-0.8, 0.8, 1.0] {
         let small = TriangleMesh::new("s", vec![Vec3::ZERO, Vec3::X * 0.2, Vec3::Z * 0.2], vec![[0, 1, 2]]);
         let place = Affine3A::from_translation(Vec3::new(0.0, height, -0.2));
         scene.add(&small, place, ObjectFlags::default()).expect("finite");
