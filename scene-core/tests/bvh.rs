@@ -201,7 +201,7 @@ fn nothing_escapes_from_a_closed_mesh() {
                 }
                 // Along the axes too, and anywhere.
                 ends.extend(Vec3::AXES.iter().flat_map(|&axis| [origin + axis, origin - axis]));
-                ends.extend((0..2000).map(|_| origin + random.point()));
+                ends.extend((0..2000).map(|_| origin + random.point().normalize_or(Vec3::X)));
                 for end in ends {
                     let direction = end - origin;
                     assert!(bvh.is_occluded(origin, LightPoint::Towards(direction)), "{origin} to {end}");

@@ -79,7 +79,7 @@ pub(super) fn crossing(corners: [Vec3; 3], direction: Vec3) -> Option<Crossing> 
     let [a, b, c] = corners.map(|v| v.as_dvec3());
     let direction = direction.as_dvec3();
     let normal = (b - a).cross(c - a);
-    let weight = |from: DVec3, to: DVec3| (to - from).cross(to + from).dot(direction);
+    let weight = |from: DVec3, to: DVec3| (to + from).cross(to - from).dot(direction);
     let (of_b, of_c) = (weight(c, a), weight(a, b));
     let sum = weight(b, c) + of_b + of_c;
     Some(Crossing { t: normal.dot(a) / normal.dot(direction), weights: [of_b / sum, of_c / sum] })

@@ -1,12 +1,12 @@
 //! The f32 filter before the exact predicate: eight triangles at a time against the rays of a shaft.
 //!
 //! A ray is (x, y, 1) in the shaft's frame. The weight of the edge from aᵢ to aⱼ is, up to a factor of 2, the
-//! dot product of the ray with n = (aⱼ − aᵢ) × (aⱼ + aᵢ). The edge vector is short where the triangle is far,
+//! dot product of the ray with n = (aⱼ + aᵢ) × (aⱼ − aᵢ). The edge vector is short where the triangle is far,
 //! so the cancellation that aᵢ × aⱼ would suffer is gone.
 //!
 //! # Error bound
 //!
-//! Let u = 2⁻²⁴, and let P be n with every product taken absolute: P_x = |e_y s_z| + |e_z s_y| and so on.
+//! Let u = 2⁻²⁴, and let P be n with every product taken absolute: P_x = |s_y e_z| + |s_z e_y| and so on, for sum s and difference e.
 //! Difference and sum are rounded once (1 u each), the products and their difference once more (2 u), so
 //! |δn| ≤ 4 u P. The slopes are rounded (1 u), multiplied (1 u) and summed (2 u), and |n| ≤ P. In all
 //! |δ(n·r)| ≤ 8 u P·|r| + O(u²), with or without fused multiply-add. 12 u P·|r| also covers the rounding of
@@ -52,12 +52,12 @@ impl Candidates {
     };
 }
 
-/// (b − a) × (other), and its products taken absolute.
+/// a × b, and its products taken absolute.
 #[inline(always)]
-fn cross<S: Simd>(e: [f32x8<S>; 3], s: [f32x8<S>; 3]) -> ([f32x8<S>; 3], [f32x8<S>; 3]) {
-    let (xy, yx) = (e[0] * s[1], e[1] * s[0]);
-    let (yz, zy) = (e[1] * s[2], e[2] * s[1]);
-    let (zx, xz) = (e[2] * s[0], e[0] * s[2]);
+fn cross<S: Simd>(a: [f32x8<S>; 3], b: [f32x8<S>; 3]) -> ([f32x8<S>; 3], [f32x8<S>; 3]) {
+    let (xy, yx) = (a[0] * b[1], a[1] * b[0]);
+    let (yz, zy) = (a[1] * b[2], a[2] * b[1]);
+    let (zx, xz) = (a[2] * b[0], a[0] * b[2]);
     ([yz - zy, zx - xz, xy - yx], [yz.abs() + zy.abs(), zx.abs() + xz.abs(), xy.abs() + yx.abs()])
 }
 
@@ -102,7 +102,7 @@ pub(super) fn cull<S: Simd>(
     let (wide_x, wide_y) = (widest(0), widest(1));
     for (edge, (from, to)) in [(a, b), (b, c), (c, a)].into_iter().enumerate() {
         let sum = [to[0] + from[0], to[1] + from[1], to[2] + from[2]];
-        let (n, p) = cross(subtract(to, from), sum);
+        let (n, p) = cross(sum, subtract(to, from));
         let n = n.map(|v| v * turn);
         let bound = p[0].mul_add(wide_x, p[1].mul_add(wide_y, p[2])).mul_add(ERROR, TINY);
         let lifted = n[2] + bound;
