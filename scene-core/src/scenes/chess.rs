@@ -41,7 +41,7 @@ fn build(values: &Values<'_>, _time: f32) -> Stage {
     let direction = Vec3::new(0.02, 0.0, 0.0) - position;
     let light = Light::Spot { position, direction, outer: 31f32.to_radians(), inner: 24f32.to_radians() };
     let mut stage =
-        Stage::new(camera(Vec3::new(0.08, 0.5, 0.62), Vec3::new(0.0, 0.008, 0.005), 40.0, 0.02), light);
+        Stage::new(camera(Vec3::new(0.08, 0.5, 0.62), Vec3::new(0.0, 0.008, 0.005), 41.5, 0.02), light);
     let half = 4.0 * SQUARE;
     stage.add("table", cuboid(Vec3::new(-1.2, -0.06, -1.2), Vec3::new(1.2, -0.03, 1.2)));
     let rim = half + 0.025;

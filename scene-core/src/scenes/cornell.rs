@@ -41,17 +41,18 @@ fn build(values: &Values<'_>, _time: f32) -> Stage {
     ] {
         stage.add(name, quad(middle + offset, u, v));
     }
-    // Corners of the blocks' tops, counter-clockwise from above.
-    let low = [[1.30, 0.65], [0.82, 2.25], [2.40, 2.72], [2.90, 1.14]];
-    let high = [[4.23, 2.47], [2.65, 2.96], [3.14, 4.56], [4.72, 4.06]];
+    // Corners of the blocks' tops in centimetres, counter-clockwise from above.
+    let low = [[130.0, 65.0], [82.0, 225.0], [240.0, 272.0], [290.0, 114.0]];
+    let high = [[423.0, 247.0], [265.0, 296.0], [314.0, 456.0], [472.0, 406.0]];
     stage.add("short block", block(low, 1.65));
     stage.add("tall block", block(high, 3.30));
     stage
 }
 
-/// A block on the floor over four corners (x, z).
+/// A block on the floor over four corners (x, z) in centimetres.
 fn block(corners: [[f32; 2]; 4], height: f32) -> TriangleMesh {
-    let positions = [0.0, height].iter().flat_map(|&y| corners.map(|[x, z]| Vec3::new(x, y, z))).collect();
+    let positions =
+        [0.0, height].iter().flat_map(|&y| corners.map(|[x, z]| Vec3::new(0.01 * x, y, 0.01 * z))).collect();
     let sides = (0..4).flat_map(|i| {
         let next = (i + 1) % 4;
         [[i, next, next + 4], [i, next + 4, i + 4]]

@@ -103,10 +103,10 @@ fn species(seed: u32) -> Vec<Species> {
 fn sites(species: &[Species], radius: f32, seed: u32) -> Vec<Site> {
     let mut sites = Vec::new();
     for (index, s) in species.iter().enumerate() {
-        let mut random = Random::new(seed, 1000 + index as u32);
         let side = (radius / s.spacing).ceil() as i32;
         for (i, j) in (-side..side).flat_map(|j| (-side..side).map(move |i| (i, j))) {
-            // Every cell draws the same numbers whatever becomes of it.
+            // A cell has numbers of its own, so that a larger forest is the smaller one and more.
+            let mut random = Random::new(seed, cell(index, i, j));
             let jitter = random.square() * 0.42;
             let (angle, scale, variant) =
                 (random.angle(), random.range(0.7, 1.2), random.index(s.variants.len()));
@@ -122,6 +122,12 @@ fn sites(species: &[Species], radius: f32, seed: u32) -> Vec<Site> {
     }
     sites.sort_by(|a, b| a.distance.total_cmp(&b.distance));
     sites
+}
+
+/// A stream of random numbers for each place of each species.
+fn cell(species: usize, i: i32, j: i32) -> u32 {
+    let mix = (i as u32).wrapping_mul(0x9E37_79B1) ^ (j as u32).wrapping_mul(0x85EB_CA77).rotate_left(13);
+    mix ^ (species as u32 + 1).wrapping_mul(0xC2B2_AE3D)
 }
 
 /// A round clearing and the lane along which the camera looks.

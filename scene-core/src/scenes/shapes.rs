@@ -109,10 +109,10 @@ pub(super) fn lathe(profile: &[Vec2], segments: u32) -> TriangleMesh {
             None if !pole => triangles.extend((2..segments).map(|k| [first, first + k, first + k - 1])),
             None => {}
             Some((start, true)) => {
-                triangles.extend((0..segments).map(|k| [start, first + (k + 1) % segments, first + k]))
+                triangles.extend((0..segments).map(|k| [start, first + (k + 1) % segments, first + k]));
             }
             Some((start, false)) if pole => {
-                triangles.extend((0..segments).map(|k| [start + k, start + (k + 1) % segments, first]))
+                triangles.extend((0..segments).map(|k| [start + k, start + (k + 1) % segments, first]));
             }
             Some((start, false)) => triangles.extend(band(start, first, segments)),
         }

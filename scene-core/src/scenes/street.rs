@@ -157,7 +157,7 @@ fn traffic(stage: &mut Stage, cars: u32, length: f32, time: f32) {
         let count = ((cars + 1 - lane as u32) / 2).min(room);
         for i in 0..count {
             let start = length * (i as f32 + 0.25 * lane as f32) / count as f32;
-            let z = NEAR - 14.0 - (start + speed * -time).rem_euclid(length);
+            let z = NEAR - 24.0 - (start + speed * -time).rem_euclid(length);
             // The lane's cars come towards the camera at +z or leave it.
             stage.moving(
                 &format!("car {}", 2 * i + 1 + lane as u32),
