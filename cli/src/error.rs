@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use scene_core::camera::CameraError;
+use scene_core::io::write::WriteError;
 use scene_core::metrics::MetricsError;
 use scene_core::technique::{SettingsError, TechniqueError};
 use thiserror::Error;
@@ -66,6 +67,8 @@ pub(crate) enum CliError {
         #[source]
         source: io::Error,
     },
+    #[error(transparent)]
+    Size(#[from] WriteError),
     #[error("cannot write to stdout")]
     Stdout(#[source] io::Error),
 }

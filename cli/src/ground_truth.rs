@@ -50,6 +50,7 @@ pub(crate) fn trace(
     let mut report = Report::default();
     let start = Instant::now();
     let bvh = report.time("prepare.bvh", |_| Bvh::casters(scene));
+    report.bytes = bvh.bytes() as u64;
     let prepare_ms = milliseconds_since(start);
     let start = Instant::now();
     let traced = report

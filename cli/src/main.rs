@@ -11,7 +11,6 @@ mod console;
 mod error;
 mod ground_truth;
 mod measure;
-mod npy;
 mod output;
 mod picture;
 mod report;

@@ -4,6 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use scene_core::io::write::WriteError;
 use tempfile::TempDir;
 
 use crate::error::CliError;
@@ -13,9 +14,6 @@ use crate::error::CliError;
 pub(crate) struct OutputFolder {
     path: PathBuf,
 }
-
-/// A file to write: its name and content.
-pub(crate) type File = (&'static str, Vec<u8>);
 
 impl OutputFolder {
     /// Checks that `path` can be written to, so that a long computation is not lost at its end. Leaves
@@ -34,27 +32,30 @@ impl OutputFolder {
         &self.path
     }
 
-    /// Writes the files beside their place, then renames them: a new folder appears whole, in one that exists
-    /// each file appears whole.
-    pub(crate) fn write(&self, files: &[File]) -> Result<(), CliError> {
+    /// Lets `fill` write files into an empty folder, then moves them to their place: a new folder appears whole,
+    /// in one that exists each file appears whole.
+    pub(crate) fn write(&self, fill: impl FnOnce(&Path) -> Result<(), WriteError>) -> Result<(), CliError> {
         let staging = self.stage()?;
         // A folder inside, because the temporary one is closed to other users and its name is not ours.
         let whole = staging.path().join("files");
         fs::create_dir(&whole).map_err(|source| self.fault(source))?;
-        for (name, bytes) in files {
-            fs::write(whole.join(name), bytes).map_err(|source| self.fault_of(name, source))?;
-        }
-        if self.path.exists() {
-            for (name, _) in files {
-                let place = self.path.join(name);
-                fs::rename(whole.join(name), place).map_err(|source| self.fault_of(name, source))?;
+        fill(&whole).map_err(|error| match error {
+            // Nobody knows the place where it was tried.
+            WriteError::Io { path, source } => self.fault_of(&path, source),
+            size @ WriteError::Size { .. } => size.into(),
+        })?;
+        if !self.path.exists() {
+            if let Some(parent) = self.path.parent() {
+                fs::create_dir_all(parent).map_err(|source| self.fault(source))?;
             }
-            return Ok(());
+            return fs::rename(&whole, &self.path).map_err(|source| self.fault(source));
         }
-        if let Some(parent) = self.path.parent() {
-            fs::create_dir_all(parent).map_err(|source| self.fault(source))?;
+        for file in fs::read_dir(&whole).map_err(|source| self.fault(source))? {
+            let file = file.map_err(|source| self.fault(source))?;
+            let place = self.path.join(file.file_name());
+            fs::rename(file.path(), place).map_err(|source| self.fault_of(&file.path(), source))?;
         }
-        fs::rename(&whole, &self.path).map_err(|source| self.fault(source))
+        Ok(())
     }
 
     /// A temporary folder on the file system of the folder: in itself, or in its nearest ancestor that exists.
@@ -72,14 +73,15 @@ impl OutputFolder {
         CliError::Write { path: self.path.clone(), source }
     }
 
-    fn fault_of(&self, name: &str, source: io::Error) -> CliError {
-        CliError::Write { path: self.path.join(name), source }
+    fn fault_of(&self, staged: &Path, source: io::Error) -> CliError {
+        CliError::Write { path: self.path.join(staged.file_name().unwrap_or_default()), source }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scene_core::io::write::bytes;
 
     fn names(path: &Path) -> Vec<String> {
         let mut names: Vec<_> =
@@ -94,15 +96,20 @@ mod tests {
         let path = root.path().join("a/b");
         let folder = OutputFolder::check(&path).unwrap();
         assert!(names(root.path()).is_empty(), "checking left something behind");
-        folder.write(&[("one", vec![1]), ("two", vec![2])]).unwrap();
+        folder
+            .write(|to| {
+                bytes(&to.join("one"), b"1")?;
+                bytes(&to.join("two"), b"2")
+            })
+            .unwrap();
         assert_eq!(
             (names(root.path()), names(&path)),
             (vec!["a".to_owned()], vec!["one".into(), "two".into()])
         );
         fs::write(path.join("mine"), "kept").unwrap();
-        folder.write(&[("two", vec![3])]).unwrap();
+        folder.write(|to| bytes(&to.join("two"), b"3")).unwrap();
         assert_eq!(names(&path), ["mine", "one", "two"]);
-        assert_eq!(fs::read(path.join("two")).unwrap(), [3]);
+        assert_eq!(fs::read(path.join("two")).unwrap(), b"3");
     }
 
     #[test]
@@ -113,8 +120,13 @@ mod tests {
         assert!(OutputFolder::check(&path).is_err());
         assert!(OutputFolder::check(&path.join("below")).is_err());
         let folder = OutputFolder::check(&root.path().join("out")).unwrap();
-        // A name that cannot be a file makes the second write fail.
-        assert!(folder.write(&[("one", vec![1]), ("no/such", vec![2])]).is_err());
+        let error = folder.write(|to| {
+            bytes(&to.join("one"), b"1")?;
+            // A folder that is not there makes the second file fail.
+            bytes(&to.join("no/such"), b"2")
+        });
+        let Err(CliError::Write { path, .. }) = error else { panic!("{error:?}") };
+        assert_eq!(path, root.path().join("out/such"));
         assert_eq!(names(root.path()), ["file"]);
     }
 }

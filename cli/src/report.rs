@@ -89,11 +89,3 @@ impl RunReport {
         }
     }
 }
-
-/// A report as the text of a file.
-pub(crate) fn json_file(report: &impl Serialize) -> Vec<u8> {
-    // Numbers, strings and maps with string keys only: this cannot fail.
-    let mut text = serde_json::to_vec_pretty(report).unwrap_or_default();
-    text.push(b'\n');
-    text
-}

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use scene_core::io::write;
 use scene_core::raster::render_gbuffer;
 use scene_core::technique::TechniqueError;
 
@@ -11,7 +12,6 @@ use crate::console::Console;
 use crate::error::CliError;
 use crate::output::OutputFolder;
 use crate::picture::shading::Shading;
-use crate::report::json_file;
 use crate::{ground_truth, measure, picture, scene_source, techniques};
 
 pub(crate) fn run(args: &CompareArgs, console: &Console) -> Result<(), CliError> {
@@ -45,16 +45,18 @@ pub(crate) fn run(args: &CompareArgs, console: &Console) -> Result<(), CliError>
     }
     let comparison = Comparison { truth: truth_row, entries, refused, error_scale: args.error_scale };
 
-    let files = {
+    {
         let _working = console.working("drawing");
-        [
-            ("contact-sheet.png", picture::png(sheet::sheet(&comparison))?),
-            ("table.csv", table::csv(&comparison)?),
-            ("report.json", json_file(&comparison.report())),
-            ("index.html", page::page(&comparison)?),
-        ]
-    };
-    out.write(&files)?;
+        let sheet = picture::png(sheet::sheet(&comparison))?;
+        let table = table::csv(&comparison)?;
+        let page = page::page(&comparison)?;
+        out.write(|to| {
+            write::bytes(&to.join("contact-sheet.png"), &sheet)?;
+            write::bytes(&to.join("table.csv"), &table)?;
+            write::json(&to.join("report.json"), &comparison.report())?;
+            write::bytes(&to.join("index.html"), &page)
+        })?;
+    }
     for refused in &comparison.refused {
         console.note(&format!("not run: {}: {}", refused.technique, refused.why));
     }

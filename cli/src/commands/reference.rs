@@ -1,5 +1,6 @@
 //! `gnomon reference`: ground truth.
 
+use scene_core::io::write;
 use scene_core::metrics;
 use scene_core::raster::render_gbuffer;
 
@@ -10,8 +11,7 @@ use crate::console::Console;
 use crate::error::CliError;
 use crate::output::OutputFolder;
 use crate::picture::shading::Shading;
-use crate::report::json_file;
-use crate::{ground_truth, npy, picture, scene_source};
+use crate::{ground_truth, picture, scene_source};
 
 pub(crate) fn run(args: &ReferenceArgs, console: &Console) -> Result<(), CliError> {
     let out = OutputFolder::check(&args.out)?;
@@ -21,16 +21,17 @@ pub(crate) fn run(args: &ReferenceArgs, console: &Console) -> Result<(), CliErro
     {
         let _working = console.working("writing");
         let shading = Shading::new(&gbuffer, &view.setup.camera, view.light());
-        let files = [
-            ("image.png", picture::png(shading.picture(&truth.visibility))?),
-            ("visibility.png", picture::png(picture::grey(&truth.visibility))?),
-            ("visibility.npy", npy::visibility(&truth.visibility)?),
-            ("std_error.npy", npy::plane(&gbuffer, &truth.std_error)?),
-            ("valid.npy", npy::mask(&gbuffer, &truth.valid)?),
-            ("position.npy", npy::positions(&gbuffer)?),
-            ("report.json", json_file(&report)),
-        ];
-        out.write(&files)?;
+        let image = picture::png(shading.picture(&truth.visibility))?;
+        let (width, height) = (gbuffer.width, gbuffer.height);
+        out.write(|to| {
+            write::bytes(&to.join("image.png"), &image)?;
+            write::visibility_png(&to.join("visibility.png"), &truth.visibility)?;
+            write::npy_f32(&to.join("visibility.npy"), &truth.visibility.values, width, height)?;
+            write::npy_f32(&to.join("std_error.npy"), &truth.std_error, width, height)?;
+            write::npy_bool(&to.join("valid.npy"), &truth.valid, width, height)?;
+            write::npy_vec3(&to.join("position.npy"), &gbuffer.position, width, height)?;
+            write::json(&to.join("report.json"), &report)
+        })?;
     }
     let shares = metrics::shares(&truth.visibility, &truth.valid)?;
     let text = format!(

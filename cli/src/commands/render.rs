@@ -1,5 +1,6 @@
 //! `gnomon render`: the shadows of one light by one technique.
 
+use scene_core::io::write;
 use scene_core::raster::render_gbuffer;
 
 use crate::args::RenderArgs;
@@ -8,8 +9,7 @@ use crate::console::Console;
 use crate::error::CliError;
 use crate::output::OutputFolder;
 use crate::picture::shading::Shading;
-use crate::report::json_file;
-use crate::{measure, npy, picture, scene_source, techniques};
+use crate::{measure, picture, scene_source, techniques};
 
 pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<(), CliError> {
     let factory = techniques::find(&args.technique)?;
@@ -24,13 +24,19 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<(), CliError> 
         let gbuffer = render_gbuffer(&view.setup.scene, &view.setup.camera);
         let run = measure::run(technique.as_ref(), &view, &gbuffer)?;
         let shading = Shading::new(&gbuffer, &view.setup.camera, view.light());
-        let files = [
-            ("image.png", picture::png(shading.picture(&run.visibility))?),
-            ("visibility.png", picture::png(picture::grey(&run.visibility))?),
-            ("visibility.npy", npy::visibility(&run.visibility)?),
-            ("report.json", json_file(&run.report)),
-        ];
-        out.write(&files)?;
+        let image = picture::png(shading.picture(&run.visibility))?;
+        let visibility = &run.visibility;
+        out.write(|to| {
+            write::bytes(&to.join("image.png"), &image)?;
+            write::visibility_png(&to.join("visibility.png"), visibility)?;
+            write::npy_f32(
+                &to.join("visibility.npy"),
+                &visibility.values,
+                visibility.width,
+                visibility.height,
+            )?;
+            write::json(&to.join("report.json"), &run.report)
+        })?;
         run
     };
     let report = &run.report;
