@@ -3,12 +3,11 @@
 use std::ops::Range;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, i32x16, mask32x16};
+use fearless_simd::{Simd, i32x4, i32x16, mask32x16};
 
 use super::clip::{FlatTriangle, clip_triangle};
 use super::depth::Cull;
 use super::draw::Frame;
-use super::pixels::BLOCK;
 use super::projection::{SUBPIXEL_BITS, SUBPIXELS, flags};
 
 /// Rows of a band are 2 to this power. A band of a 1024 pixels wide map is 128 KiB and stays in a core's
@@ -17,9 +16,15 @@ pub(super) const BAND_BITS: u32 = 5;
 /// Rows of a band.
 pub(super) const BAND_ROWS: usize = 1 << BAND_BITS;
 
-/// A triangle whose box is at most this many pixels long on both sides is filled lane by lane. Larger trades
-/// idle lanes for the set-up of a row-by-row triangle. At most 16, so that its edge functions fit i32.
-pub(super) const SMALL_PIXELS: i32 = 8;
+/// Triangles that are set up at once.
+pub(super) const LANES: usize = 16;
+
+/// A triangle whose box is at most this many pixels long on both sides is tested together with fifteen others.
+/// Larger would leave lanes idle; smaller pays the start of a row of pixels too often.
+pub(super) const TINY_PIXELS: i32 = 4;
+/// One whose box is at most this long has its rows tested eight pixels at once. Larger would test pixels in vain;
+/// at most 64, so that edge functions fit i32.
+pub(super) const SMALL_PIXELS: i32 = 32;
 
 /// Triangles of one object to draw.
 #[derive(Clone, Debug)]
@@ -33,7 +38,9 @@ pub(super) struct Piece {
 /// What a band has to draw.
 #[derive(Debug, Default)]
 pub(super) struct BandBin {
-    /// Indices of small triangles.
+    /// Indices of triangles of at most [`TINY_PIXELS`].
+    pub(super) tiny: Vec<u32>,
+    /// Indices of triangles of at most [`SMALL_PIXELS`].
     pub(super) small: Vec<u32>,
     /// Indices of larger ones.
     pub(super) large: Vec<u32>,
@@ -57,6 +64,7 @@ impl Bins {
             self.bands.resize_with(bands, BandBin::default);
         }
         for band in &mut self.bands {
+            band.tiny.clear();
             band.small.clear();
             band.large.clear();
             band.flat.clear();
@@ -99,57 +107,89 @@ pub(super) fn covered(min: i32, max: i32, size: i32) -> Range<i32> {
     first.max(0)..(last + 1).min(size)
 }
 
-/// Sixteen triangles with their corners spread over lanes.
-pub(super) struct Corners {
-    /// x of the first, second and third corner.
-    pub(super) x: [[i32; BLOCK]; 3],
-    /// y.
-    pub(super) y: [[i32; BLOCK]; 3],
+/// Sixteen triangles, a lane each: first, second and third corners.
+pub(super) struct Corners<S: Simd> {
+    pub(super) x: [i32x16<S>; 3],
+    pub(super) y: [i32x16<S>; 3],
     /// Bits of the nearness.
-    pub(super) nearness: [[i32; BLOCK]; 3],
-    /// Flags.
-    pub(super) flags: [[i32; BLOCK]; 3],
+    pub(super) nearness: [i32x16<S>; 3],
+    pub(super) flags: [i32x16<S>; 3],
 }
 
-impl Corners {
-    /// Lanes that hide their triangle.
-    pub(super) const EMPTY: Self = Self {
-        x: [[0; BLOCK]; 3],
-        y: [[0; BLOCK]; 3],
-        nearness: [[0; BLOCK]; 3],
-        flags: [[flags::BEHIND; BLOCK]; 3],
-    };
-
-    /// Puts a triangle into a lane.
+impl<S: Simd> Corners<S> {
+    /// The triangles with these vertices.
     #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, frame: &Frame<'_>, triangle: [u32; 3]) {
-        for corner in 0..3 {
-            let [x, y, nearness, flags] = frame.vertices[triangle[corner] as usize];
-            self.x[corner][lane] = x;
-            self.y[corner][lane] = y;
-            self.nearness[corner][lane] = nearness;
-            self.flags[corner][lane] = flags;
+    pub(super) fn gather(simd: S, frame: &Frame<'_>, triangles: &[[u32; 3]; LANES]) -> Self {
+        // Spelled out: a closure handed to the standard library may be compiled without vector instructions.
+        let first = gather_corner::<S, 0>(simd, frame, triangles);
+        let second = gather_corner::<S, 1>(simd, frame, triangles);
+        let third = gather_corner::<S, 2>(simd, frame, triangles);
+        Self {
+            x: [first[0], second[0], third[0]],
+            y: [first[1], second[1], third[1]],
+            nearness: [first[2], second[2], third[2]],
+            flags: [first[3], second[3], third[3]],
         }
     }
+}
+
+/// The four components of one corner of sixteen triangles.
+#[inline(always)]
+fn gather_corner<S: Simd, const CORNER: usize>(
+    simd: S,
+    frame: &Frame<'_>,
+    triangles: &[[u32; 3]; LANES],
+) -> [i32x16<S>; 4] {
+    let a =
+        gather_four::<S, CORNER>(simd, frame, [&triangles[0], &triangles[1], &triangles[2], &triangles[3]]);
+    let b =
+        gather_four::<S, CORNER>(simd, frame, [&triangles[4], &triangles[5], &triangles[6], &triangles[7]]);
+    let c =
+        gather_four::<S, CORNER>(simd, frame, [&triangles[8], &triangles[9], &triangles[10], &triangles[11]]);
+    let d = gather_four::<S, CORNER>(
+        simd,
+        frame,
+        [&triangles[12], &triangles[13], &triangles[14], &triangles[15]],
+    );
+    [
+        a[0].combine(b[0]).combine(c[0].combine(d[0])),
+        a[1].combine(b[1]).combine(c[1].combine(d[1])),
+        a[2].combine(b[2]).combine(c[2].combine(d[2])),
+        a[3].combine(b[3]).combine(c[3].combine(d[3])),
+    ]
+}
+
+/// A vertex is a row of four; the transpose of four rows has a component a row.
+#[inline(always)]
+fn gather_four<S: Simd, const CORNER: usize>(
+    simd: S,
+    frame: &Frame<'_>,
+    triangles: [&[u32; 3]; 4],
+) -> [i32x4<S>; 4] {
+    let a = i32x4::from_slice(simd, &frame.vertices[triangles[0][CORNER] as usize]);
+    let b = i32x4::from_slice(simd, &frame.vertices[triangles[1][CORNER] as usize]);
+    let c = i32x4::from_slice(simd, &frame.vertices[triangles[2][CORNER] as usize]);
+    let d = i32x4::from_slice(simd, &frame.vertices[triangles[3][CORNER] as usize]);
+    let (xy0, xy1) = (a.zip_low(c), b.zip_low(d));
+    let (zf0, zf1) = (a.zip_high(c), b.zip_high(d));
+    [xy0.zip_low(xy1), xy0.zip_high(xy1), zf0.zip_low(zf1), zf0.zip_high(zf1)]
 }
 
 /// Sorts the triangles of `piece` into `bins`.
 #[inline(always)]
 pub(super) fn sort_piece<S: Simd>(simd: S, frame: &Frame<'_>, piece: &Piece, bins: &mut Bins) {
-    let lanes = |v: &[i32; BLOCK]| i32x16::from_slice(simd, v);
     let hidden_by = if frame.clamp { flags::SIDES } else { flags::SIDES | flags::NEAR | flags::FAR };
-    let (mut first_row, mut last_row) = ([0; BLOCK], [0; BLOCK]);
+    let (mut first_row, mut last_row) = ([0; LANES], [0; LANES]);
     let mut start = piece.triangles.start;
-    for triangles in frame.scene.triangles()[piece.triangles.clone()].chunks(BLOCK) {
-        let mut corners = Corners::EMPTY;
-        for (lane, &triangle) in triangles.iter().enumerate() {
-            corners.set(lane, frame, triangle);
-        }
-        let [x0, x1, x2] = corners.x.each_ref().map(lanes);
-        let [y0, y1, y2] = corners.y.each_ref().map(lanes);
-        let [f0, f1, f2] = corners.flags.each_ref().map(lanes);
+    for triangles in frame.scene.triangles()[piece.triangles.clone()].chunks(LANES) {
+        // Lanes without a triangle repeat the last one and are masked.
+        let used = mask32x16::from_bitmask(simd, (1 << triangles.len()) - 1);
+        let mut lanes = [triangles[triangles.len() - 1]; LANES];
+        lanes[..triangles.len()].copy_from_slice(triangles);
+        let corners = Corners::gather(simd, frame, &lanes);
+        let ([x0, x1, x2], [y0, y1, y2], [f0, f1, f2]) = (corners.x, corners.y, corners.flags);
 
-        let seen = (f0 & f1 & f2 & hidden_by).simd_eq(0);
+        let seen = used & (f0 & f1 & f2 & hidden_by).simd_eq(0);
         let whole = ((f0 | f1 | f2) & flags::CLIP).simd_eq(0);
         let (x_min, x_max) = (x0.min(x1).min(x2), x0.max(x1).max(x2));
         let (y_min, y_max) = (y0.min(y1).min(y2), y0.max(y1).max(y2));
@@ -160,8 +200,10 @@ pub(super) fn sort_piece<S: Simd>(simd: S, frame: &Frame<'_>, piece: &Piece, bin
         let row1 = ((y_max - half) >> SUBPIXEL_BITS).min(frame.height - 1);
         let covers = column0.simd_le(column1) & row0.simd_le(row1);
 
-        let limit = SMALL_PIXELS << SUBPIXEL_BITS;
-        let small = (x_max - x_min).simd_lt(limit) & (y_max - y_min).simd_lt(limit);
+        // No overflow: a guarded coordinate has 24 bits.
+        let extent = (x_max - x_min).max(y_max - y_min);
+        let small = extent.simd_lt(SMALL_PIXELS << SUBPIXEL_BITS);
+        let tiny = extent.simd_lt(TINY_PIXELS << SUBPIXEL_BITS);
         // Twice the area, positive where the corners run clockwise as seen. It wraps for large triangles, of
         // which it decides nothing.
         let area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0);
@@ -173,24 +215,29 @@ pub(super) fn sort_piece<S: Simd>(simd: S, frame: &Frame<'_>, piece: &Piece, bin
         let whole_seen = seen & whole & covers & (faces | !small);
         row0.store_slice(&mut first_row);
         row1.store_slice(&mut last_row);
-        let small = small.to_bitmask();
+        let (tiny, small) = (tiny.to_bitmask(), small.to_bitmask());
         for lane in set_bits(whole_seen) {
             let id = (start + lane) as u32;
             if piece.cutout {
-                bins.push_flat(frame, flat(&corners, lane, id));
+                bins.push_flat(frame, FlatTriangle::whole(frame, id));
                 continue;
             }
             for band in &mut bins.bands[band_of(first_row[lane])..=band_of(last_row[lane])] {
-                if small >> lane & 1 == 1 { band.small.push(id) } else { band.large.push(id) }
+                let list = match (tiny >> lane & 1, small >> lane & 1) {
+                    (1, _) => &mut band.tiny,
+                    (_, 1) => &mut band.small,
+                    _ => &mut band.large,
+                };
+                list.push(id);
             }
         }
         for lane in set_bits(seen & !whole) {
             let id = start + lane;
-            clip_triangle(&frame.projection, frame.scene.corners(id), id as u32, |part| {
+            clip_triangle(frame.projection, frame.scene.corners(id), id as u32, |part| {
                 bins.push_flat(frame, part);
             });
         }
-        start += BLOCK;
+        start += LANES;
     }
 }
 
@@ -204,16 +251,6 @@ pub(super) fn set_bits<S: Simd>(mask: mask32x16<S>) -> impl Iterator<Item = usiz
         bits &= bits.wrapping_sub(1);
         more.then_some(lane)
     })
-}
-
-/// A lane's triangle for filling row by row.
-fn flat(corners: &Corners, lane: usize, id: u32) -> FlatTriangle {
-    FlatTriangle {
-        x: corners.x.map(|x| x[lane]),
-        y: corners.y.map(|y| y[lane]),
-        nearness: corners.nearness.map(|n| f64::from(f32::from_bits(n[lane] as u32))),
-        id,
-    }
 }
 
 #[cfg(test)]

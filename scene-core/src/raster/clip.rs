@@ -6,6 +6,7 @@
 
 use glam::{DVec4, Vec3};
 
+use super::draw::Frame;
 use super::projection::{GUARD_MAX, GUARD_MIN, MIN_W, Projection};
 
 /// A triangle ready for filling, with nearness in f64 since a corner close to the eye has a huge one.
@@ -19,6 +20,20 @@ pub(super) struct FlatTriangle {
     pub(super) nearness: [f64; 3],
     /// The triangle of the scene it is part of.
     pub(super) id: u32,
+}
+
+impl FlatTriangle {
+    /// A triangle that needs no clipping.
+    #[inline(always)]
+    pub(super) fn whole(frame: &Frame<'_>, id: u32) -> Self {
+        let corners = frame.scene.triangles()[id as usize].map(|i| frame.vertices[i as usize]);
+        Self {
+            x: corners.map(|c| c[0]),
+            y: corners.map(|c| c[1]),
+            nearness: corners.map(|c| f64::from(f32::from_bits(c[2] as u32))),
+            id,
+        }
+    }
 }
 
 /// Corners a clipped triangle can have: each of the five planes adds at most one.

@@ -96,12 +96,13 @@ pub const DEPTH_POSITION_ERROR: f32 = 0.5 / super::projection::SUBPIXELS as f32;
 /// centre, from the plane's `slope` (change of depth a pixel, along x plus along y, absolute) and the largest
 /// depth of the triangle's corners (0 to 1; the range of depths is at most that).
 ///
-/// The first term is [`DEPTH_POSITION_ERROR`]; the second counts half-ulp roundings (2⁻²⁴ each): one a corner
-/// when projected, six relative to the depth range in the weights, their products and sum, sixteen a pixel's
-/// step in a row of sixteen, one at the end.
+/// The first term is [`DEPTH_POSITION_ERROR`] and, where blocks of eight pixels are stepped through in f32, two
+/// roundings over eight steps. The second counts roundings of half an ulp (2⁻²⁴): one a corner when projected,
+/// seven relative to the depth range in the weights, their products and sum, two when the result is put
+/// together.
 pub fn depth_error(slope: f32, largest: f32) -> f32 {
     const HALF_ULP: f32 = f32::EPSILON * 0.5;
-    slope * (DEPTH_POSITION_ERROR + 16.0 * HALF_ULP) + largest * (8.0 * HALF_ULP)
+    slope * (DEPTH_POSITION_ERROR + 16.0 * HALF_ULP) + largest * (10.0 * HALF_ULP)
 }
 
 /// Draws the casters of `scene` as seen through `clip_from_world`, nearest depth first.
@@ -124,8 +125,8 @@ pub fn render_depth(
     target
 }
 
-/// [`render_depth`] into a map that is there already, of its width and height; with the same `scratch` repeated
-/// frames allocate next to nothing.
+/// [`render_depth`] into a map that is there already, of its width and height; with the same `scratch` a repeated
+/// frame allocates nothing.
 ///
 /// # Panics
 /// If a side is longer than [`MAX_SIDE`].
@@ -230,7 +231,7 @@ fn drawing<'a>(
 fn casters<'a>(
     scene: &'a Scene,
     options: &DepthOptions<'a>,
-) -> impl Iterator<Item = (Range<usize>, u32)> + use<'a> {
+) -> impl Iterator<Item = (Range<usize>, u32)> + Clone + use<'a> {
     let all = 0..scene.triangles().len();
     let (filter, all) = match options.triangles {
         Some(ranges) => (ranges, None),

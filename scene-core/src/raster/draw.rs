@@ -75,7 +75,7 @@ pub(super) struct Frame<'a> {
 /// Draws the triangles of `ranges`, each within one object, into `bands`, which take 32 rows each from the top.
 pub(super) fn draw<P: Pixels>(
     drawing: &Drawing<'_>,
-    ranges: impl Iterator<Item = (Range<usize>, u32)>,
+    ranges: impl Iterator<Item = (Range<usize>, u32)> + Clone,
     scratch: &mut RasterScratch,
     bands: impl IndexedParallelIterator<Item = P>,
 ) {
@@ -109,11 +109,10 @@ pub(super) fn draw<P: Pixels>(
 
 impl RasterScratch {
     /// Cuts what is to be drawn into tasks of about equal size.
-    fn plan(&mut self, scene: &Scene, ranges: impl Iterator<Item = (Range<usize>, u32)>) {
+    fn plan(&mut self, scene: &Scene, ranges: impl Iterator<Item = (Range<usize>, u32)> + Clone) {
         self.pieces.clear();
         self.tasks.clear();
-        let ranges: Vec<_> = ranges.collect();
-        let total: usize = ranges.iter().map(|(range, _)| range.len()).sum();
+        let total: usize = ranges.clone().map(|(range, _)| range.len()).sum();
         // Four a thread even out; how many there are changes no result.
         let share = total.div_ceil(rayon::current_num_threads() * 4).max(TRIANGLE_CHUNK);
         let (mut first_piece, mut triangles) = (0, 0);
@@ -167,15 +166,10 @@ fn project_vertices<S: Simd>(
 fn fill_band<S: Simd>(simd: S, frame: &Frame<'_>, band: usize, bins: &[Bins], pixels: &mut impl Pixels) {
     for bins in bins {
         let bin = &bins.bands[band];
-        small::fill(simd, frame, band, &bin.small, pixels);
+        small::fill_tiny(simd, frame, band, &bin.tiny, pixels);
+        small::fill_small(simd, frame, band, &bin.small, pixels);
         for &id in &bin.large {
-            let corners = frame.scene.triangles()[id as usize].map(|i| frame.vertices[i as usize]);
-            let triangle = FlatTriangle {
-                x: corners.map(|c| c[0]),
-                y: corners.map(|c| c[1]),
-                nearness: corners.map(|c| f64::from(f32::from_bits(c[2] as u32))),
-                id,
-            };
+            let triangle = FlatTriangle::whole(frame, id);
             spans::fill(simd, frame, band, &triangle, &Tests::NONE, pixels);
         }
         for &index in &bin.flat {
@@ -188,6 +182,76 @@ fn fill_band<S: Simd>(simd: S, frame: &Frame<'_>, band: usize, bins: &[Bins], pi
                 cutout: Cutout::new(frame.scene, frame.projection, triangle.id as usize),
             };
             spans::fill(simd, frame, band, triangle, &tests, pixels);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::Level;
+    use glam::{Affine3A, Mat4, Vec3};
+
+    use super::RasterScratch;
+    use crate::geometry::ObjectFlags;
+    use crate::raster::{DepthConvention, DepthMap, DepthOptions, render_depth_and_objects_into};
+    use crate::{Scene, TriangleMesh};
+
+    /// Every level of vector instructions this processor has.
+    fn levels() -> Vec<Level> {
+        let best = Level::new();
+        let mut levels = vec![Level::baseline(), best];
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        {
+            use fearless_simd::Simd as _;
+            levels.extend(best.as_sse2().map(|s| s.level()));
+            levels.extend(best.as_sse4_2().map(|s| s.level()));
+            levels.extend(best.as_avx2().map(|s| s.level()));
+        }
+        levels
+    }
+
+    #[test]
+    fn every_level_of_vector_instructions_gives_the_same_bits() {
+        // A sheet of waves in which triangles of all sizes occur, some across near, far and the sides.
+        let side = 120_u32;
+        let mut positions = Vec::new();
+        for i in 0..side * side {
+            let (x, y) = ((i % side) as f32 / 60.0 - 1.0, (i / side) as f32 / 60.0 - 1.0);
+            let stretch = (x * 5.0).exp2() * 0.1;
+            positions.push(Vec3::new(x * 1.3, y * stretch, 0.5 + 0.55 * (x * 7.0).sin() * (y * 11.0).cos()));
+        }
+        let mut triangles = Vec::new();
+        for i in (0..side - 1).flat_map(|row| (0..side - 1).map(move |column| row * side + column)) {
+            triangles.extend([[i, i + 1, i + side], [i + 1, i + side + 1, i + side]]);
+        }
+        let mut scene = Scene::new();
+        for _ in 0..2 {
+            let mesh = TriangleMesh::new("waves", positions.clone(), triangles.clone());
+            scene.add(&mesh, Affine3A::IDENTITY, ObjectFlags::default()).unwrap();
+            positions.iter_mut().for_each(|p| *p = Vec3::new(p.y, p.x, p.z + 0.01));
+        }
+        for convention in [DepthConvention::Reversed, DepthConvention::Forward] {
+            let options = DepthOptions { convention, ..Default::default() };
+            let drawn: Vec<_> = levels()
+                .into_iter()
+                .map(|level| {
+                    let mut scratch = RasterScratch { level, ..RasterScratch::new() };
+                    let mut map = DepthMap { width: 517, height: 301, depth: Vec::new() };
+                    let mut objects = Vec::new();
+                    let matrix = Mat4::IDENTITY;
+                    render_depth_and_objects_into(
+                        &scene,
+                        matrix,
+                        &options,
+                        &mut scratch,
+                        &mut map,
+                        &mut objects,
+                    );
+                    (map.depth.iter().map(|d| d.to_bits()).collect::<Vec<_>>(), objects)
+                })
+                .collect();
+            assert!(drawn[0].1.contains(&0) && drawn[0].1.contains(&1));
+            assert!(drawn.iter().all(|d| *d == drawn[0]));
         }
     }
 }

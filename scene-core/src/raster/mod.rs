@@ -12,9 +12,8 @@
 //! 2. Sixteen triangles at a time, those that cover no pixel centre are dropped and the rest is sorted into
 //!    bands of rows (`bins`); what crosses the near or far plane, the eye's plane or the guard band is clipped
 //!    in homogeneous coordinates (`clip`).
-//! 3. A thread owns a band. Small triangles are tested sixteen at once, pixel by pixel of their boxes
-//!    (`small`); larger ones are cut into rows whose ends an exact integer DDA yields, sixteen pixels at once
-//!    (`spans`).
+//! 3. A thread owns a band. Small triangles are set up sixteen at once and tested lane by lane
+//!    (`small`); larger ones are cut into rows whose ends an exact integer DDA yields (`spans`).
 //!
 //! # Coverage
 //! A pixel is covered if its centre lies inside the snapped triangle, decided in integers with the top-left
@@ -26,8 +25,8 @@
 //! A stored depth is, up to rounding, the exact depth of a point of the triangle whose projection lies at most
 //! 2⁻⁹ pixel in x and in y from the pixel's centre. This holds for slivers and for triangles seen edge-on too,
 //! because depth is interpolated by exact integer weights of the snapped corners, never extrapolated: it stays
-//! between the depths of the corners. Rounding adds at most 6·2⁻²⁴ of the depth range of the triangle's
-//! corners, plus 16·2⁻²⁴ of the change of depth from a pixel to the next, plus half an ulp of the depth itself
+//! between the depths of the corners. Rounding adds at most 7·2⁻²⁴ of the depth range of the triangle's
+//! corners, plus 16·2⁻²⁴ of the change of depth from a pixel to the next, plus an ulp of the depth itself
 //! and half an ulp of each corner's. [`DEPTH_POSITION_ERROR`] and [`depth_error`] say the same in code: biases
 //! derive from them.
 //!

@@ -1,10 +1,10 @@
 //! What becomes of a covered pixel: nearest depth, nearest triangle, or a count.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16, mask32x16, u32x16};
+use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
 
 /// Pixels that are filled at once.
-pub(super) const BLOCK: usize = 16;
+pub(super) const BLOCK: usize = 8;
 
 /// The face that covers a pixel.
 #[derive(Clone, Copy)]
@@ -23,9 +23,9 @@ pub(super) trait Pixels: Send {
     /// One covered pixel.
     fn sample(&mut self, index: usize, nearness: f32, face: Face);
 
-    /// Up to sixteen covered pixels from `index` on. Lanes outside `mask` may lie beyond the band's end and
+    /// Up to eight covered pixels from `index` on. Lanes outside `mask` may lie beyond the band's end and
     /// hold anything.
-    fn block<S: Simd>(&mut self, simd: S, index: usize, nearness: f32x16<S>, mask: mask32x16<S>, face: Face);
+    fn block<S: Simd>(&mut self, simd: S, index: usize, nearness: f32x8<S>, mask: mask32x8<S>, face: Face);
 
     /// After the last.
     fn finish(&mut self);
@@ -36,8 +36,8 @@ pub(super) trait Pixels: Send {
 fn samples<S: Simd>(
     pixels: &mut impl Pixels,
     index: usize,
-    nearness: f32x16<S>,
-    mask: mask32x16<S>,
+    nearness: f32x8<S>,
+    mask: mask32x8<S>,
     face: Face,
 ) {
     let nearness = nearness.to_array();
@@ -72,17 +72,18 @@ impl Pixels for DepthPixels<'_> {
     }
 
     #[inline(always)]
-    fn block<S: Simd>(&mut self, simd: S, index: usize, nearness: f32x16<S>, mask: mask32x16<S>, face: Face) {
+    fn block<S: Simd>(&mut self, simd: S, index: usize, nearness: f32x8<S>, mask: mask32x8<S>, face: Face) {
         let Some(depth) = self.depth.get_mut(index..index + BLOCK) else {
             return samples(self, index, nearness, mask, face);
         };
-        let old = f32x16::from_slice(simd, depth);
+        let old = f32x8::from_slice(simd, depth);
         (mask & nearness.simd_gt(old)).select(nearness, old).store_slice(depth);
     }
 
     fn finish(&mut self) {
         if self.negate {
-            self.depth.iter_mut().for_each(|depth| *depth = -*depth);
+            // Subtracting leaves no negative zero, of which vector sets disagree whether it is the lesser.
+            self.depth.iter_mut().for_each(|depth| *depth = 0.0 - *depth);
         }
     }
 }
@@ -111,15 +112,15 @@ impl Pixels for TrianglePixels<'_> {
     }
 
     #[inline(always)]
-    fn block<S: Simd>(&mut self, simd: S, index: usize, nearness: f32x16<S>, mask: mask32x16<S>, face: Face) {
+    fn block<S: Simd>(&mut self, simd: S, index: usize, nearness: f32x8<S>, mask: mask32x8<S>, face: Face) {
         let range = index..index + BLOCK;
         let (Some(depth), Some(triangle)) =
             (self.depth.depth.get_mut(range.clone()), self.triangle.get_mut(range))
         else {
             return samples(self, index, nearness, mask, face);
         };
-        let (old, old_id) = (f32x16::from_slice(simd, depth), u32x16::from_slice(simd, triangle));
-        let id = u32x16::splat(simd, face.id);
+        let (old, old_id) = (f32x8::from_slice(simd, depth), u32x8::from_slice(simd, triangle));
+        let id = u32x8::splat(simd, face.id);
         let wins = mask & (nearness.simd_gt(old) | (nearness.simd_eq(old) & id.simd_lt(old_id)));
         wins.select(nearness, old).store_slice(depth);
         wins.select(id, old_id).store_slice(triangle);
@@ -151,14 +152,7 @@ impl Pixels for CountPixels<'_> {
     }
 
     #[inline(always)]
-    fn block<S: Simd>(
-        &mut self,
-        _simd: S,
-        index: usize,
-        nearness: f32x16<S>,
-        mask: mask32x16<S>,
-        face: Face,
-    ) {
+    fn block<S: Simd>(&mut self, _simd: S, index: usize, nearness: f32x8<S>, mask: mask32x8<S>, face: Face) {
         samples(self, index, nearness, mask, face);
     }
 

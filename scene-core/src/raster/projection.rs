@@ -85,8 +85,8 @@ impl Projection {
         let (x, y, nearness) = (p.x * inverse, p.y * inverse, p.z * inverse);
         let bit = |outside: bool, flag: i32| if outside { flag } else { 0 };
         // Single `&`, so that there is nothing to branch on.
-        let snappable =
-            (p.w > MIN_W) & (x >= GUARD_MIN) & (x <= GUARD_MAX) & (y >= GUARD_MIN) & (y <= GUARD_MAX);
+        let guard = GUARD_MIN..=GUARD_MAX;
+        let snappable = (p.w > MIN_W) & guard.contains(&x) & guard.contains(&y);
         let outside = bit(p.x < 0.0, flags::LEFT)
             | bit(p.x > self.width * p.w, flags::RIGHT)
             | bit(p.y < 0.0, flags::TOP)

@@ -1,7 +1,7 @@
 //! Larger triangles: row by row, between ends that an exact integer DDA yields.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16, mask32x16};
+use fearless_simd::{Simd, f32x8, mask32x8};
 
 use super::bins::{BAND_ROWS, covered};
 use super::clip::FlatTriangle;
@@ -144,7 +144,7 @@ pub(super) fn fill<S: Simd>(
         -((a[1] - c[1]) as f64 * z1 + (b[1] - a[1]) as f64 * z2) * (inverse_area * f64::from(SUBPIXELS));
     z0 = z0.clamp(f64::from(-f32::MAX), f64::from(f32::MAX));
     let fill = SpanFill {
-        ramp: f32x16::from_fn(simd, |lane| lane as f32)
+        ramp: f32x8::from_fn(simd, |lane| lane as f32)
             * (slope.clamp(f64::from(-f32::MAX), f64::from(f32::MAX)) as f32),
         slope,
         limits: [z_min as f32, z_max as f32],
@@ -177,7 +177,7 @@ pub(super) fn fill<S: Simd>(
 /// What the rows of a triangle have in common.
 struct SpanFill<'a, S: Simd> {
     /// Change of nearness from the first pixel of a block to each.
-    ramp: f32x16<S>,
+    ramp: f32x8<S>,
     slope: f64,
     limits: [f32; 2],
     tests: &'a Tests<'a>,
@@ -192,7 +192,7 @@ impl<S: Simd> SpanFill<'_, S> {
             let base = (nearness + start as f64 * self.slope) as f32;
             let mut z = (self.ramp + base).max(self.limits[0]).min(self.limits[1]);
             let lanes = (length - start).min(BLOCK);
-            let mut mask = mask32x16::from_bitmask(simd, (1 << lanes) - 1);
+            let mut mask = mask32x8::from_bitmask(simd, (1 << lanes) - 1);
             if let Some([far, near]) = self.tests.range {
                 if self.tests.clamp {
                     z = z.max(far).min(near);

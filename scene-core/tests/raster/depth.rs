@@ -1,5 +1,7 @@
 //! Depth maps: the bound they promise, conventions, filters, masks, threads.
 
+#![expect(clippy::single_range_in_vec_init, reason = "a list of one range of triangles is what is meant")]
+
 use std::sync::Arc;
 
 use glam::camera::rh::proj::directx::{perspective, perspective_infinite_reverse};
@@ -305,9 +307,9 @@ fn a_mask_cuts_at_the_perspective_correct_texel() {
             }
             let expected = mask.is_solid(point * 0.25);
             if expected {
-                solid += 1
+                solid += 1;
             } else {
-                open += 1
+                open += 1;
             }
             wrong += u32::from((map.depth[(y * size + x) as usize] > 0.0) != expected);
         }
