@@ -98,17 +98,15 @@ pub(super) fn cull<S: Simd>(
         }
         turn[lane] = side.signum() as f32;
     }
-    let widest = |i: usize| lanes.slopes[i][0].abs().max(lanes.slopes[i][1].abs());
-    let (wide_x, wide_y) = (widest(0), widest(1));
+    let [x, y] = lanes.slopes;
+    let (wide_x, wide_y) = (x[0].abs().max(x[1].abs()), y[0].abs().max(y[1].abs()));
     for (edge, (from, to)) in [(a, b), (b, c), (c, a)].into_iter().enumerate() {
         let sum = [to[0] + from[0], to[1] + from[1], to[2] + from[2]];
         let (n, p) = cross(sum, subtract(to, from));
-        let n = n.map(|v| v * turn);
+        let n = [n[0] * turn, n[1] * turn, n[2] * turn];
         let bound = p[0].mul_add(wide_x, p[1].mul_add(wide_y, p[2])).mul_add(ERROR, TINY);
         let lifted = n[2] + bound;
-        let most = (n[0] * lanes.slopes[0][0]).max(n[0] * lanes.slopes[0][1])
-            + (n[1] * lanes.slopes[1][0]).max(n[1] * lanes.slopes[1][1])
-            + lifted;
+        let most = (n[0] * x[0]).max(n[0] * x[1]) + (n[1] * y[0]).max(n[1] * y[1]) + lifted;
         left &= !(most.simd_lt(0.0).to_bitmask() as u32);
         n[0].store_array(&mut out.edges[edge][0]);
         n[1].store_array(&mut out.edges[edge][1]);

@@ -96,12 +96,13 @@ impl Shaft {
         for group in 0..groups {
             let at = 8 * group..8 * group + 8;
             let used = mask32x8::from_bitmask(simd, mask >> (8 * group) & 0xff);
-            let load = |axis: usize| f32x8::from_slice(simd, &ends[axis][at.clone()]);
             // Unused lanes get z = 1, so that they divide quietly.
-            let along = select(used, load(z) * flip, f32x8::splat(simd, 1.0));
+            let along =
+                select(used, f32x8::from_slice(simd, &ends[z][at.clone()]) * flip, f32x8::splat(simd, 1.0));
             along.store_slice(&mut rays.ends[2][at.clone()]);
-            for (i, axis) in [x, y].into_iter().enumerate() {
-                let across = select(used, load(axis), f32x8::splat(simd, 0.0));
+            for i in 0..2 {
+                let across = f32x8::from_slice(simd, &ends[axes[i]][at.clone()]);
+                let across = select(used, across, f32x8::splat(simd, 0.0));
                 across.store_slice(&mut rays.ends[i][at.clone()]);
                 (across / along).store_slice(&mut rays.slopes[i][at.clone()]);
             }
@@ -167,41 +168,69 @@ pub(super) struct ShaftLanes<S: Simd> {
     pub(super) hi: [f32x8<S>; 3],
 }
 
+/// Moves eight coordinates.
+#[inline(always)]
+fn relative<S: Simd>(simd: S, values: &[f32; 8], origin: f32x8<S>) -> f32x8<S> {
+    f32x8::load_array_ref(simd, values) - origin
+}
+
+/// Whether all three corners lie below, and above, the side planes of slope `low` and `high`.
+#[inline(always)]
+fn beside<S: Simd>(across: [f32x8<S>; 3], along: [f32x8<S>; 3], [low, high]: [f32x8<S>; 2]) -> mask32x8<S> {
+    let below = across[0].simd_lt(low * along[0])
+        & across[1].simd_lt(low * along[1])
+        & across[2].simd_lt(low * along[2]);
+    let above = across[0].simd_gt(high * along[0])
+        & across[1].simd_gt(high * along[1])
+        & across[2].simd_gt(high * along[2]);
+    below | above
+}
+
+// No closures and no `map` over vectors here: they are not inlined for sure, and what is not inlined does not
+// use the vector unit.
 impl<S: Simd> ShaftLanes<S> {
     #[inline(always)]
     pub(super) fn new(simd: S, shaft: &Shaft) -> Self {
-        let splat = |v: f32| f32x8::splat(simd, v);
-        Self {
+        let zero = f32x8::splat(simd, 0.0);
+        let mut lanes = Self {
             simd,
             axes: shaft.axes,
             flipped: shaft.flip < 0.0,
-            flip: splat(shaft.flip),
-            origin: shaft.origin.map(splat),
-            slopes: shaft.slopes.map(|pair| pair.map(splat)),
-            lo: shaft.lo.map(splat),
-            hi: shaft.hi.map(splat),
+            flip: f32x8::splat(simd, shaft.flip),
+            origin: [zero; 3],
+            slopes: [[zero; 2]; 2],
+            lo: [zero; 3],
+            hi: [zero; 3],
+        };
+        for axis in 0..3 {
+            lanes.origin[axis] = f32x8::splat(simd, shaft.origin[axis]);
+            lanes.lo[axis] = f32x8::splat(simd, shaft.lo[axis]);
+            lanes.hi[axis] = f32x8::splat(simd, shaft.hi[axis]);
         }
+        for axis in 0..2 {
+            for side in 0..2 {
+                lanes.slopes[axis][side] = f32x8::splat(simd, shaft.slopes[axis][side]);
+            }
+        }
+        lanes
     }
 
     /// The children of a node that may hold a triangle that a ray of the shaft crosses, as bits, and the least
     /// z of each box.
     #[inline(always)]
     pub(super) fn children(&self, node: &Node) -> (u32, f32x8<S>) {
-        let simd = self.simd;
-        let relative = |bound: &[[f32; 8]; 3], axis: usize| {
-            f32x8::load_array_ref(simd, &bound[self.axes[axis]]) - self.origin[axis]
-        };
-        let lo = [relative(&node.lo, 0), relative(&node.lo, 1)];
-        let hi = [relative(&node.hi, 0), relative(&node.hi, 1)];
+        let (simd, z) = (self.simd, self.axes[2]);
         let (near, far) = if self.flipped { (&node.hi, &node.lo) } else { (&node.lo, &node.hi) };
-        let near = relative(near, 2) * self.flip;
-        let far = relative(far, 2) * self.flip;
+        let near = relative(simd, &near[z], self.origin[2]) * self.flip;
+        let far = relative(simd, &far[z], self.origin[2]) * self.flip;
         let mut outside = near.simd_gt(self.hi[2]) | far.simd_lt(self.lo[2]);
         for i in 0..2 {
+            let lo = relative(simd, &node.lo[self.axes[i]], self.origin[i]);
+            let hi = relative(simd, &node.hi[self.axes[i]], self.origin[i]);
             let [low, high] = self.slopes[i];
-            outside = outside | lo[i].simd_gt(self.hi[i]) | hi[i].simd_lt(self.lo[i]);
-            outside = outside | hi[i].simd_lt((low * near).min(low * far));
-            outside = outside | lo[i].simd_gt((high * near).max(high * far));
+            outside = outside | lo.simd_gt(self.hi[i]) | hi.simd_lt(self.lo[i]);
+            outside = outside | hi.simd_lt((low * near).min(low * far));
+            outside = outside | lo.simd_gt((high * near).max(high * far));
         }
         (!outside.to_bitmask() as u32 & ((1 << node.count) - 1), near)
     }
@@ -209,28 +238,26 @@ impl<S: Simd> ShaftLanes<S> {
     /// The corners of a block's triangles, in the shaft's frame.
     #[inline(always)]
     pub(super) fn block_corners(&self, block: &Block) -> [[f32x8<S>; 3]; 3] {
-        std::array::from_fn(|corner| {
-            let axis = |i: usize| {
-                f32x8::load_array_ref(self.simd, &block.corners[corner][self.axes[i]]) - self.origin[i]
-            };
-            [axis(0), axis(1), axis(2) * self.flip]
-        })
+        let mut corners = [self.origin; 3];
+        for (corner, values) in corners.iter_mut().zip(&block.corners) {
+            for axis in 0..3 {
+                corner[axis] = relative(self.simd, &values[self.axes[axis]], self.origin[axis]);
+            }
+            corner[2] = corner[2] * self.flip;
+        }
+        corners
     }
 
     /// The triangles that lie wholly outside one plane of the shaft.
     #[inline(always)]
-    pub(super) fn outside(&self, corners: &[[f32x8<S>; 3]; 3]) -> mask32x8<S> {
-        let [a, b, c] = corners;
+    pub(super) fn outside(&self, [a, b, c]: &[[f32x8<S>; 3]; 3]) -> mask32x8<S> {
         let mut outside =
             a[2].min(b[2]).min(c[2]).simd_gt(self.hi[2]) | a[2].max(b[2]).max(c[2]).simd_lt(self.lo[2]);
         for i in 0..2 {
-            let [low, high] = self.slopes[i];
-            let below = |v: &[f32x8<S>; 3]| v[i].simd_lt(low * v[2]);
-            let above = |v: &[f32x8<S>; 3]| v[i].simd_gt(high * v[2]);
-            outside = outside | (below(a) & below(b) & below(c)) | (above(a) & above(b) & above(c));
-            outside = outside
-                | a[i].min(b[i]).min(c[i]).simd_gt(self.hi[i])
-                | a[i].max(b[i]).max(c[i]).simd_lt(self.lo[i]);
+            let across = [a[i], b[i], c[i]];
+            outside = outside | beside(across, [a[2], b[2], c[2]], self.slopes[i]);
+            outside = outside | across[0].min(across[1]).min(across[2]).simd_gt(self.hi[i]);
+            outside = outside | across[0].max(across[1]).max(across[2]).simd_lt(self.lo[i]);
         }
         outside
     }

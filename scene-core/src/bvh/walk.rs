@@ -6,7 +6,7 @@ use glam::Vec3;
 use super::exact::{self, Crossing};
 use super::filter::{Candidates, ERROR, TINY, cull};
 use super::shaft::{Rays, Shaft, ShaftLanes};
-use super::tree::{Block, Node, Tree};
+use super::tree::{Block, Node, Tree, WIDTH};
 
 /// Entries of the stack that need no allocation. A tree of a million triangles uses about 60.
 const INLINE_STACK: usize = 128;
@@ -17,16 +17,6 @@ pub(super) trait Cutout: Copy {
     fn lanes(self, block: usize) -> u32;
     /// Whether the surface exists at a point of such a triangle.
     fn is_solid(self, block: usize, lane: usize, crossing: &Crossing) -> bool;
-}
-
-/// Runs `walk` with a stack that the tree cannot overflow.
-#[inline(always)]
-fn with_stack<T: Copy, R>(tree: &Tree, empty: T, walk: impl FnOnce(&mut [T]) -> R) -> R {
-    if tree.stack <= INLINE_STACK {
-        walk(&mut [empty; INLINE_STACK])
-    } else {
-        walk(&mut vec![empty; tree.stack])
-    }
 }
 
 /// Whether one ray, whose end is `end` in the frame of its shaft, is blocked by one triangle: the exact answer.
@@ -56,8 +46,16 @@ pub(super) fn occluded<S: Simd, C: Cutout>(
     let lanes = ShaftLanes::new(simd, shaft);
     let mut alive = rays.mask;
     let mut found = Candidates::NONE;
-    with_stack(tree, root, |stack| {
-        stack[0] = root;
+    // Closures would not be inlined, and leave the vector unit; hence no helper here.
+    let mut inline = [root; INLINE_STACK];
+    let mut allocated;
+    let stack = if tree.stack <= INLINE_STACK {
+        &mut inline[..]
+    } else {
+        allocated = vec![root; tree.stack];
+        &mut allocated[..]
+    };
+    {
         let mut height = 1;
         while height > 0 {
             height -= 1;
@@ -86,8 +84,14 @@ pub(super) fn occluded<S: Simd, C: Cutout>(
                 }
             }
         }
-    });
+    }
     rays.mask & !alive
+}
+
+/// One lane's value in all lanes.
+#[inline(always)]
+fn spread<S: Simd>(simd: S, values: &[f32; WIDTH], lane: usize) -> S::f32s {
+    S::f32s::splat(simd, values[lane & (WIDTH - 1)])
 }
 
 /// Tests the rays in `alive` against the candidates of a block and returns those that are still unblocked.
@@ -105,12 +109,14 @@ fn test_rays<S: Simd>(
 ) -> u64 {
     let width = S::f32s::LEN;
     let every = u64::MAX >> (64 - width);
-    let splat = |v: f32| S::f32s::splat(simd, v);
     let mut triangles = found.lanes;
     while triangles != 0 {
         let lane = triangles.trailing_zeros() as usize;
         triangles &= triangles - 1;
-        let edges = found.edges.each_ref().map(|edge| edge.each_ref().map(|c| splat(c[lane])));
+        let [a, b, c] = &found.edges;
+        let a = [spread(simd, &a[0], lane), spread(simd, &a[1], lane), spread(simd, &a[2], lane)];
+        let b = [spread(simd, &b[0], lane), spread(simd, &b[1], lane), spread(simd, &b[2], lane)];
+        let c = [spread(simd, &c[0], lane), spread(simd, &c[1], lane), spread(simd, &c[2], lane)];
         for group in 0..(64 - alive.leading_zeros() as usize).div_ceil(width) {
             let at = group * width..(group + 1) * width;
             let waiting = alive >> at.start & every;
@@ -119,7 +125,11 @@ fn test_rays<S: Simd>(
             }
             let x = S::f32s::from_slice(simd, &rays.slopes[0][at.clone()]);
             let y = S::f32s::from_slice(simd, &rays.slopes[1][at.clone()]);
-            let inside = edges.map(|[a, b, c]| x.mul_add(a, y.mul_add(b, c)));
+            let inside = [
+                x.mul_add(a[0], y.mul_add(a[1], a[2])),
+                x.mul_add(b[0], y.mul_add(b[1], b[2])),
+                x.mul_add(c[0], y.mul_add(c[1], c[2])),
+            ];
             let least = inside[0].min(inside[1]).min(inside[2]);
             let possible = least.simd_ge(0.0).to_bitmask() & waiting;
             if possible == 0 {
@@ -129,18 +139,18 @@ fn test_rays<S: Simd>(
             let mut sure = 0;
             let mut possible = possible;
             if masked >> lane & 1 == 0 {
-                let doubt = |edge: usize| splat(found.twice_bound[edge][lane]);
-                let meets =
-                    inside[0].simd_gt(doubt(0)) & inside[1].simd_gt(doubt(1)) & inside[2].simd_gt(doubt(2));
+                let meets = inside[0].simd_gt(spread(simd, &found.twice_bound[0], lane))
+                    & inside[1].simd_gt(spread(simd, &found.twice_bound[1], lane))
+                    & inside[2].simd_gt(spread(simd, &found.twice_bound[2], lane));
                 sure = meets.to_bitmask();
                 if rays.finite {
-                    let mut beyond = splat(0.0);
-                    let mut doubt = splat(TINY);
+                    let mut beyond = S::f32s::splat(simd, 0.0);
+                    let mut doubt = S::f32s::splat(simd, TINY);
                     for axis in 0..3 {
                         let end = S::f32s::from_slice(simd, &rays.ends[axis][at.clone()]);
-                        let past = end - splat(found.corner[axis][lane]);
-                        beyond = past.mul_add(splat(found.normal[axis][lane]), beyond);
-                        doubt = past.abs().mul_add(splat(found.normal_error[axis][lane]), doubt);
+                        let past = end - spread(simd, &found.corner[axis], lane);
+                        beyond = past.mul_add(spread(simd, &found.normal[axis], lane), beyond);
+                        doubt = past.abs().mul_add(spread(simd, &found.normal_error[axis], lane), doubt);
                     }
                     // The normal is turned so that it has a positive product with the first corner: a ray
                     // that ends past the plane has a positive one too.
@@ -196,8 +206,15 @@ pub(super) fn closest<S: Simd, C: Cutout>(
     // z grows with t. The bound is one relative ulp wider than the product, which is rounded once.
     let z_of = |t: f64| (t * f64::from(direction.z) * (1.0 + f64::from(ERROR))) as f32;
     let mut z_max = z_of(t_max);
-    with_stack(tree, (root, 0.0_f32), |stack| {
-        stack[0] = (root, 0.0);
+    let mut inline = [(root, 0.0_f32); INLINE_STACK];
+    let mut allocated;
+    let stack = if tree.stack <= INLINE_STACK {
+        &mut inline[..]
+    } else {
+        allocated = vec![(root, 0.0); tree.stack];
+        &mut allocated[..]
+    };
+    {
         let mut height = 1;
         while height > 0 {
             height -= 1;
@@ -245,6 +262,6 @@ pub(super) fn closest<S: Simd, C: Cutout>(
                 }
             }
         }
-    });
+    }
     best
 }
