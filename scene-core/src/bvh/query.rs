@@ -60,6 +60,19 @@ impl Bvh {
         }
     }
 
+    /// For each pair of origin and target, as the pixels of a tile have, whether anything blocks the light between
+    /// them: [`Bvh::is_occluded`] for each, bit for bit; what `blocked` held before is overwritten. Coherent rays
+    /// are fastest.
+    ///
+    /// # Panics
+    /// If the three differ in length.
+    pub fn occluded_packet(&self, origins: &[Vec3], targets: &[LightPoint], blocked: &mut [bool]) {
+        assert!(origins.len() == targets.len() && targets.len() == blocked.len(), "one answer a ray");
+        for ((&origin, &target), blocked) in origins.iter().zip(targets).zip(blocked) {
+            *blocked = self.is_occluded(origin, target);
+        }
+    }
+
     /// [`Bvh::occluded_from`] for at most 64 targets, as bits: bit i says that target i is blocked. Targets past
     /// the 64th are ignored.
     pub fn occluded_mask(&self, origin: Vec3, targets: &[LightPoint]) -> u64 {

@@ -164,7 +164,14 @@ fn build_binary(ids: &[u32], corners: &(impl Fn(u32) -> [Vec3; 3] + Sync), bound
         })
         .collect();
     // Leaves are formed below, so the builder keeps one triangle a leaf.
-    let params = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::medium_build() };
+    let mut params = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::medium_build() };
+    // Boxes that cover the whole a thousand times over cannot be parted by any tree, and looking for better
+    // places among them takes time with the square of their number.
+    let whole = obvhs::aabb::Aabb::new(unit(bounds.min), unit(bounds.max)).half_area();
+    let covered: f64 = boxes.iter().map(|b| f64::from(b.half_area())).sum();
+    if covered > 1000.0 * f64::from(whole) {
+        params.reinsertion_batch_ratio = 0.0;
+    }
     build_bvh2(&boxes, params, &mut Duration::default())
 }
 
