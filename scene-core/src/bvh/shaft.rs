@@ -12,10 +12,11 @@
 //! * x < fl(m z) implies x < m z for any x of f32, again by monotonicity, so a corner that is found outside a
 //!   side plane of the pyramid is outside.
 
-use fearless_simd::{Simd, SimdBase, SimdMask, f32x8, mask32x8};
+use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8, mask32x8};
 use glam::Vec3;
 
-use super::tree::{Block, Node};
+use super::filter::{ERROR, TINY};
+use super::tree::{Block, Node, WIDTH};
 
 /// Rays of one packet at most: one bit each of a mask.
 pub(super) const MAX_RAYS: usize = 64;
@@ -26,12 +27,12 @@ pub(super) const MAX_REACH: f32 = (1_u64 << 38) as f32;
 /// The largest slope of a ray against the shaft's axis; a wider bundle is split.
 const MAX_SLOPE: f32 = 1024.0;
 
-/// Rays from one origin, in the frame of their shaft.
-pub(super) struct Rays {
+/// Up to N rays from one origin, in the frame of their shaft. N is a multiple of 16.
+pub(super) struct Rays<const N: usize> {
     /// Ends (or directions) by coordinate.
-    pub(super) ends: [[f32; MAX_RAYS]; 3],
+    pub(super) ends: [[f32; N]; 3],
     /// x/z and y/z.
-    pub(super) slopes: [[f32; MAX_RAYS]; 2],
+    pub(super) slopes: [[f32; N]; 2],
     /// Which rays there are.
     pub(super) mask: u64,
     /// Whether the rays stop at their ends; else they go on for ever.
@@ -54,30 +55,45 @@ pub(super) struct Shaft {
     pub(super) hi: [f32; 3],
 }
 
+impl<const N: usize> Rays<N> {
+    /// Of the rays in `among`, those whose slopes lie in the span of a child box.
+    #[inline(always)]
+    pub(super) fn within<S: Simd>(
+        &self,
+        simd: S,
+        spans: &[[f32; WIDTH]; 4],
+        child: usize,
+        among: u64,
+    ) -> u64 {
+        let width = S::f32s::LEN;
+        let [x0, x1, y0, y1] = [0, 1, 2, 3].map(|i: usize| spans[i][child & (WIDTH - 1)]);
+        let mut within = 0;
+        for group in 0..(64 - among.leading_zeros() as usize).div_ceil(width) {
+            let at = group * width..(group + 1) * width;
+            let x = S::f32s::from_slice(simd, &self.slopes[0][at.clone()]);
+            let y = S::f32s::from_slice(simd, &self.slopes[1][at.clone()]);
+            let inside = x.simd_ge(x0) & x.simd_le(x1) & y.simd_ge(y0) & y.simd_le(y1);
+            within |= inside.to_bitmask() << at.start;
+        }
+        within & among
+    }
+}
+
 impl Shaft {
     /// The shaft around the rays from `origin` to (or along) each of `ends` that `mask` names, and the rays in
     /// its frame. `None` if the bundle is too wide for one frame or reaches too far for f32.
     #[inline(always)]
-    pub(super) fn new<S: Simd>(
+    pub(super) fn new<S: Simd, const N: usize>(
         simd: S,
         origin: Vec3,
-        ends: &[[f32; MAX_RAYS]; 3],
+        ends: &[[f32; N]; 3],
         mask: u64,
         finite: bool,
-    ) -> Option<(Self, Rays)> {
+    ) -> Option<(Self, Rays<N>)> {
         let groups = (64 - mask.leading_zeros() as usize).div_ceil(8);
-        let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        let (mut lo, mut hi) = ([0.0; 3], [0.0; 3]);
         for axis in 0..3 {
-            let mut low = f32x8::splat(simd, f32::INFINITY);
-            let mut high = f32x8::splat(simd, f32::NEG_INFINITY);
-            for (group, lanes) in ends[axis].as_chunks::<8>().0[..groups].iter().enumerate() {
-                let used = mask32x8::from_bitmask(simd, mask >> (8 * group) & 0xff);
-                let value = f32x8::load_array_ref(simd, lanes);
-                low = low.min(select(used, value, low));
-                high = high.max(select(used, value, high));
-            }
-            lo[axis] = low.reduce_min();
-            hi[axis] = high.reduce_max();
+            (lo[axis], hi[axis]) = range(simd, &ends[axis], mask, groups);
         }
         // How far all rays go along an axis, at least.
         let advance = |axis: usize| lo[axis].max(-hi[axis]);
@@ -91,7 +107,7 @@ impl Shaft {
         }
         let flip = if lo[z] > 0.0 { 1.0 } else { -1.0 };
         let axes = [x, y, z];
-        let mut rays = Rays { ends: [[0.0; MAX_RAYS]; 3], slopes: [[0.0; MAX_RAYS]; 2], mask, finite };
+        let mut rays = Rays { ends: [[0.0; N]; 3], slopes: [[0.0; N]; 2], mask, finite };
         let mut slopes = [[0.0; 2]; 2];
         for group in 0..groups {
             let at = 8 * group..8 * group + 8;
@@ -108,15 +124,8 @@ impl Shaft {
             }
         }
         for i in 0..2 {
-            let mut low = f32x8::splat(simd, f32::INFINITY);
-            let mut high = f32x8::splat(simd, f32::NEG_INFINITY);
-            for (group, lanes) in rays.slopes[i].as_chunks::<8>().0[..groups].iter().enumerate() {
-                let used = mask32x8::from_bitmask(simd, mask >> (8 * group) & 0xff);
-                let value = f32x8::load_array_ref(simd, lanes);
-                low = low.min(select(used, value, low));
-                high = high.max(select(used, value, high));
-            }
-            slopes[i] = [low.reduce_min().next_down(), high.reduce_max().next_up()];
+            let (low, high) = range(simd, &rays.slopes[i], mask, groups);
+            slopes[i] = [low.next_down(), high.next_up()];
         }
         let mut shaft =
             Self { axes, flip, origin: axes.map(|a| origin[a]), slopes, lo: [0.0; 3], hi: [0.0; 3] };
@@ -147,6 +156,20 @@ impl Shaft {
         let reach = (bounds.min - origin).abs().max((bounds.max - origin).abs());
         reach.cmple(Vec3::splat(MAX_REACH)).all()
     }
+}
+
+/// The least and the largest of the values that `mask` names, among the first `groups` of eight.
+#[inline(always)]
+fn range<S: Simd, const N: usize>(simd: S, values: &[f32; N], mask: u64, groups: usize) -> (f32, f32) {
+    let mut low = f32x8::splat(simd, f32::INFINITY);
+    let mut high = f32x8::splat(simd, f32::NEG_INFINITY);
+    for (group, lanes) in values.as_chunks::<8>().0.iter().take(groups).enumerate() {
+        let used = mask32x8::from_bitmask(simd, mask >> (8 * group) & 0xff);
+        let value = f32x8::load_array_ref(simd, lanes);
+        low = low.min(select(used, value, low));
+        high = high.max(select(used, value, high));
+    }
+    (low.reduce_min(), high.reduce_max())
 }
 
 /// `if_true` where `mask`, else `if_false`.
@@ -215,15 +238,23 @@ impl<S: Simd> ShaftLanes<S> {
         lanes
     }
 
-    /// The children of a node that may hold a triangle that a ray of the shaft crosses, as bits, and the least
-    /// z of each box.
+    /// The children of a node that may hold a triangle that a ray of the shaft crosses, as bits; the least z of
+    /// each box; and, if asked for, the slopes that each box spans: x from and to, y from and to.
     #[inline(always)]
-    pub(super) fn children(&self, node: &Node) -> (u32, f32x8<S>) {
+    pub(super) fn children<const SPANS: bool>(
+        &self,
+        node: &Node,
+        spans: &mut [[f32; WIDTH]; 4],
+    ) -> (u32, f32x8<S>) {
         let (simd, z) = (self.simd, self.axes[2]);
         let (near, far) = if self.flipped { (&node.hi, &node.lo) } else { (&node.lo, &node.hi) };
         let near = relative(simd, &near[z], self.origin[2]) * self.flip;
         let far = relative(simd, &far[z], self.origin[2]) * self.flip;
         let mut outside = near.simd_gt(self.hi[2]) | far.simd_lt(self.lo[2]);
+        let one = f32x8::splat(simd, 1.0);
+        // A box that reaches behind the origin spans all slopes.
+        let ahead = near.simd_gt(TINY);
+        let (over_near, over_far) = if SPANS { (one / near, one / far) } else { (one, one) };
         for i in 0..2 {
             let lo = relative(simd, &node.lo[self.axes[i]], self.origin[i]);
             let hi = relative(simd, &node.hi[self.axes[i]], self.origin[i]);
@@ -231,6 +262,15 @@ impl<S: Simd> ShaftLanes<S> {
             outside = outside | lo.simd_gt(self.hi[i]) | hi.simd_lt(self.lo[i]);
             outside = outside | hi.simd_lt((low * near).min(low * far));
             outside = outside | lo.simd_gt((high * near).max(high * far));
+            if SPANS {
+                // Reciprocal and product are rounded, and so is the slope of a ray: 3 u.
+                let from = (lo * over_near).min(lo * over_far);
+                let to = (hi * over_near).max(hi * over_far);
+                let from = from - from.abs().mul_add(ERROR, TINY);
+                let to = to + to.abs().mul_add(ERROR, TINY);
+                select(ahead, from, -one * f32::INFINITY).store_array(&mut spans[2 * i]);
+                select(ahead, to, one * f32::INFINITY).store_array(&mut spans[2 * i + 1]);
+            }
         }
         (!outside.to_bitmask() as u32 & ((1 << node.count) - 1), near)
     }
