@@ -6,7 +6,7 @@ use glam::Vec3;
 use super::exact::{self, Crossing};
 use super::filter::{Candidates, ERROR, TINY, cull};
 use super::shaft::{Rays, Shaft, ShaftLanes};
-use super::tree::{Block, Node, Tree, WIDTH};
+use super::tree::{Block, Link, Node, Tree, WIDTH};
 
 /// Entries of the stack that need no allocation. A tree of a million triangles uses about 60.
 const INLINE_STACK: usize = 128;
@@ -57,20 +57,21 @@ pub(super) fn occluded<S: Simd, C: Cutout, const N: usize>(
     let mut found = Candidates::NONE;
     let mut spans = [[0.0; WIDTH]; 4];
     // Closures would not be inlined, and leave the vector unit; hence no helper here.
-    let mut inline = [(root, 0_u64); INLINE_STACK];
+    // Two plain arrays, as filling one of pairs takes longer than many a walk.
+    let (mut inline_links, mut inline_masks) = ([Link::NONE; INLINE_STACK], [0_u64; INLINE_STACK]);
     let mut allocated;
-    let stack = if tree.stack <= INLINE_STACK {
-        &mut inline[..]
+    let (links, masks) = if tree.stack <= INLINE_STACK {
+        (&mut inline_links[..], &mut inline_masks[..])
     } else {
-        allocated = vec![(root, 0_u64); tree.stack];
-        &mut allocated[..]
+        allocated = (vec![Link::NONE; tree.stack], vec![0; tree.stack]);
+        (&mut allocated.0[..], &mut allocated.1[..])
     };
-    stack[0] = (root, alive);
+    (links[0], masks[0]) = (root, alive);
     let mut height = 1;
     while height > 0 {
         height -= 1;
-        let (link, through) = stack[height];
-        let through = through & alive;
+        let link = links[height];
+        let through = masks[height] & alive;
         if through == 0 {
             continue;
         }
@@ -86,7 +87,7 @@ pub(super) fn occluded<S: Simd, C: Cutout, const N: usize>(
                 hit &= hit - 1;
                 let through = if is_single { through } else { rays.within(simd, &spans, child, through) };
                 if through != 0 {
-                    stack[height] = (node.links[child], through);
+                    (links[height], masks[height]) = (node.links[child], through);
                     height += 1;
                 }
             }
@@ -285,20 +286,21 @@ pub(super) fn closest<S: Simd, C: Cutout, const N: usize>(
     // z grows with t. The bound is one relative ulp wider than the product, which is rounded once.
     let z_of = |t: f64| (t * f64::from(direction.z) * (1.0 + f64::from(ERROR))) as f32;
     let mut z_max = z_of(t_max);
-    let mut inline = [(root, 0.0_f32); INLINE_STACK];
+    let (mut inline_links, mut inline_depths) = ([Link::NONE; INLINE_STACK], [0.0_f32; INLINE_STACK]);
     let mut allocated;
-    let stack = if tree.stack <= INLINE_STACK {
-        &mut inline[..]
+    let (links, depths) = if tree.stack <= INLINE_STACK {
+        (&mut inline_links[..], &mut inline_depths[..])
     } else {
-        allocated = vec![(root, 0.0); tree.stack];
-        &mut allocated[..]
+        allocated = (vec![Link::NONE; tree.stack], vec![0.0; tree.stack]);
+        (&mut allocated.0[..], &mut allocated.1[..])
     };
+    links[0] = root;
     {
         let mut height = 1;
         while height > 0 {
             height -= 1;
-            let (link, z) = stack[height];
-            if z > z_max {
+            let link = links[height];
+            if depths[height] > z_max {
                 continue;
             }
             if !link.is_leaf() {
@@ -311,11 +313,11 @@ pub(super) fn closest<S: Simd, C: Cutout, const N: usize>(
                     let child = hit.trailing_zeros() as usize;
                     hit &= hit - 1;
                     let mut at = height;
-                    while at > bottom && stack[at - 1].1 < near[child] {
-                        stack[at] = stack[at - 1];
+                    while at > bottom && depths[at - 1] < near[child] {
+                        (links[at], depths[at]) = (links[at - 1], depths[at - 1]);
                         at -= 1;
                     }
-                    stack[at] = (node.links[child], near[child]);
+                    (links[at], depths[at]) = (node.links[child], near[child]);
                     height += 1;
                 }
                 continue;
