@@ -23,10 +23,7 @@ impl Bvh {
         if !origin.is_finite() || !direction.is_finite() || direction == Vec3::ZERO {
             return None;
         }
-        let mut ends = [[0.0; FEW]; 3];
-        for axis in 0..3 {
-            ends[axis][0] = direction[axis];
-        }
+        let ends = direction.to_array().map(|end| [end]);
         let (t_min, t_max) = (f64::from(t_min), f64::from(t_max));
         let fits = Shaft::can_reach(origin, self.tree.bounds);
         let first = dispatch!(self.level, simd => {
@@ -44,7 +41,7 @@ impl Bvh {
     /// Whether anything blocks the light that comes from `target` to `origin`. Nothing does if the two are one,
     /// the direction is zero, or a coordinate is not finite.
     pub fn is_occluded(&self, origin: Vec3, target: LightPoint) -> bool {
-        self.occluded_mask(origin, &[target]) != 0
+        self.occluded_packed::<1>(origin, &[target]) != 0
     }
 
     /// For each of `targets`, usually samples of one light, whether anything blocks it from `origin`; what

@@ -27,7 +27,7 @@ pub(super) const MAX_REACH: f32 = (1_u64 << 38) as f32;
 /// The largest slope of a ray against the shaft's axis; a wider bundle is split.
 const MAX_SLOPE: f32 = 1024.0;
 
-/// Up to N rays from one origin, in the frame of their shaft. N is a multiple of 16.
+/// Up to N rays from one origin, in the frame of their shaft. N is 1 or a multiple of 16.
 pub(super) struct Rays<const N: usize> {
     /// Ends (or directions) by coordinate.
     pub(super) ends: [[f32; N]; 3],
@@ -90,18 +90,18 @@ impl Shaft {
         mask: u64,
         finite: bool,
     ) -> Option<(Self, Rays<N>)> {
-        let groups = (64 - mask.leading_zeros() as usize).div_ceil(8);
+        let groups = if N == 1 { 0 } else { (64 - mask.leading_zeros() as usize).div_ceil(8) };
         let (mut lo, mut hi) = ([0.0; 3], [0.0; 3]);
         for axis in 0..3 {
             (lo[axis], hi[axis]) = range(simd, &ends[axis], mask, groups);
         }
-        // How far all rays go along an axis, at least.
-        let advance = |axis: usize| lo[axis].max(-hi[axis]);
-        let z = (0..3).max_by(|&a, &b| advance(a).total_cmp(&advance(b)))?;
+        // How far all rays go along an axis, at least; the frame's z is where that is farthest.
+        let advance = [lo[0].max(-hi[0]), lo[1].max(-hi[1]), lo[2].max(-hi[2])];
+        let z =
+            if advance[2] > advance[0].max(advance[1]) { 2 } else { usize::from(advance[1] > advance[0]) };
         let (x, y) = ((z + 1) % 3, (z + 2) % 3);
         let reach = |axis: usize| hi[axis].max(-lo[axis]);
-        let widest = reach(x).max(reach(y));
-        let forward = advance(z);
+        let (widest, forward) = (reach(x).max(reach(y)), advance[z]);
         if !(forward > 0.0 && widest <= forward * MAX_SLOPE && widest.max(reach(z)) <= MAX_REACH) {
             return None;
         }
@@ -109,6 +109,10 @@ impl Shaft {
         let axes = [x, y, z];
         let mut rays = Rays { ends: [[0.0; N]; 3], slopes: [[0.0; N]; 2], mask, finite };
         let mut slopes = [[0.0; 2]; 2];
+        if N == 1 {
+            rays.ends = [[ends[x][0]], [ends[y][0]], [ends[z][0] * flip]].map(|[end]| [end; N]);
+            rays.slopes = [[rays.ends[0][0] / rays.ends[2][0]; N], [rays.ends[1][0] / rays.ends[2][0]; N]];
+        }
         for group in 0..groups {
             let at = 8 * group..8 * group + 8;
             let used = mask32x8::from_bitmask(simd, mask >> (8 * group) & 0xff);
@@ -161,6 +165,9 @@ impl Shaft {
 /// The least and the largest of the values that `mask` names, among the first `groups` of eight.
 #[inline(always)]
 fn range<S: Simd, const N: usize>(simd: S, values: &[f32; N], mask: u64, groups: usize) -> (f32, f32) {
+    if N == 1 {
+        return (values[0], values[0]);
+    }
     let mut low = f32x8::splat(simd, f32::INFINITY);
     let mut high = f32x8::splat(simd, f32::NEG_INFINITY);
     for (group, lanes) in values.as_chunks::<8>().0.iter().take(groups).enumerate() {

@@ -6,7 +6,7 @@ use glam::Vec3;
 use super::exact::{self, Crossing};
 use super::filter::{Candidates, ERROR, TINY, cull};
 use super::shaft::{Rays, Shaft, ShaftLanes};
-use super::tree::{Block, Node, Tree, WIDTH};
+use super::tree::{Block, Link, Node, Tree, WIDTH};
 
 /// Entries of the stack that need no allocation. A tree of a million triangles uses about 60.
 const INLINE_STACK: usize = 128;
@@ -53,30 +53,29 @@ pub(super) fn occluded<S: Simd, C: Cutout, const N: usize>(
     let Some(root) = tree.root else { return 0 };
     let lanes = ShaftLanes::new(simd, shaft);
     let mut alive = rays.mask;
-    let is_single = alive.is_power_of_two();
-    let mut found = Candidates::NONE;
     let mut spans = [[0.0; WIDTH]; 4];
     // Closures would not be inlined, and leave the vector unit; hence no helper here.
-    let mut inline = [(root, 0_u64); INLINE_STACK];
+    // Two plain arrays, as filling one of pairs takes longer than many a walk.
+    let (mut inline_links, mut inline_masks) = ([Link::NONE; INLINE_STACK], [0_u64; INLINE_STACK]);
     let mut allocated;
-    let stack = if tree.stack <= INLINE_STACK {
-        &mut inline[..]
+    let (links, masks) = if tree.stack <= INLINE_STACK {
+        (&mut inline_links[..], &mut inline_masks[..])
     } else {
-        allocated = vec![(root, 0_u64); tree.stack];
-        &mut allocated[..]
+        allocated = (vec![Link::NONE; tree.stack], vec![0; tree.stack]);
+        (&mut allocated.0[..], &mut allocated.1[..])
     };
-    stack[0] = (root, alive);
+    (links[0], masks[0]) = (root, alive);
     let mut height = 1;
     while height > 0 {
         height -= 1;
-        let (link, through) = stack[height];
-        let through = through & alive;
+        let link = links[height];
+        let through = masks[height] & alive;
         if through == 0 {
             continue;
         }
         if !link.is_leaf() {
             let node: &Node = &tree.nodes[link.index()];
-            let (mut hit, _) = if is_single {
+            let (mut hit, _) = if N == 1 {
                 lanes.children::<false>(node, &mut spans)
             } else {
                 lanes.children::<true>(node, &mut spans)
@@ -84,19 +83,16 @@ pub(super) fn occluded<S: Simd, C: Cutout, const N: usize>(
             while hit != 0 {
                 let child = hit.trailing_zeros() as usize;
                 hit &= hit - 1;
-                let through = if is_single { through } else { rays.within(simd, &spans, child, through) };
+                let through = if N == 1 { through } else { rays.within(simd, &spans, child, through) };
                 if through != 0 {
-                    stack[height] = (node.links[child], through);
+                    (links[height], masks[height]) = (node.links[child], through);
                     height += 1;
                 }
             }
             continue;
         }
         let block = &tree.blocks[link.index()];
-        cull(simd, shaft, &lanes, block, link.count(), &mut found);
-        if found.lanes == 0 {
-            continue;
-        }
+        let Some(found) = cull(simd, shaft, &lanes, block, link.count()) else { continue };
         let masked = cutout.map_or(0, |c| c.lanes(link.index()));
         let solid = |lane: usize, crossing: &Crossing| {
             cutout.is_none_or(|c| c.is_solid(link.index(), lane, crossing))
@@ -115,7 +111,7 @@ pub(super) fn occluded<S: Simd, C: Cutout, const N: usize>(
 
 /// One lane's value in all lanes.
 #[inline(always)]
-fn spread<S: Simd>(simd: S, values: &[f32; WIDTH], lane: usize) -> S::f32s {
+fn spread<S: Simd>(simd: S, values: &f32x8<S>, lane: usize) -> S::f32s {
     S::f32s::splat(simd, values[lane & (WIDTH - 1)])
 }
 
@@ -127,18 +123,12 @@ fn ray_by_ray<S: Simd, const N: usize>(
     shaft: &Shaft,
     rays: &Rays<N>,
     block: &Block,
-    found: &Candidates,
+    found: &Candidates<S>,
     mut through: u64,
     masked: u32,
     solid: impl Fn(usize, &Crossing) -> bool,
 ) -> u64 {
-    let mut edges = [[f32x8::splat(simd, 0.0); 3]; 3];
-    for edge in 0..3 {
-        for axis in 0..3 {
-            edges[edge][axis] = f32x8::load_array_ref(simd, &found.edges[edge][axis]);
-        }
-    }
-    let [a, b, c] = edges;
+    let [a, b, c] = found.edges;
     let mut blocked = 0;
     while through != 0 {
         let ray = through.trailing_zeros() as usize & (N - 1);
@@ -155,18 +145,18 @@ fn ray_by_ray<S: Simd, const N: usize>(
         if possible == 0 {
             continue;
         }
-        let meets = inside[0].simd_gt(f32x8::load_array_ref(simd, &found.twice_bound[0]))
-            & inside[1].simd_gt(f32x8::load_array_ref(simd, &found.twice_bound[1]))
-            & inside[2].simd_gt(f32x8::load_array_ref(simd, &found.twice_bound[2]));
+        let meets = inside[0].simd_gt(found.twice_bound[0])
+            & inside[1].simd_gt(found.twice_bound[1])
+            & inside[2].simd_gt(found.twice_bound[2]);
         let mut sure = meets.to_bitmask() as u32 & !masked;
         if rays.finite {
             let mut beyond = f32x8::splat(simd, 0.0);
             let mut doubt = f32x8::splat(simd, TINY);
             for axis in 0..3 {
-                let corner = f32x8::load_array_ref(simd, &found.corner[axis]);
+                let corner = found.corner[axis];
                 let past = f32x8::splat(simd, rays.ends[axis][ray]) - corner;
-                beyond = past.mul_add(f32x8::load_array_ref(simd, &found.normal[axis]), beyond);
-                doubt = past.abs().mul_add(f32x8::load_array_ref(simd, &found.normal_error[axis]), doubt);
+                beyond = past.mul_add(found.normal[axis], beyond);
+                doubt = past.abs().mul_add(found.normal_error[axis], doubt);
             }
             // The normal is turned so that it has a positive product with the first corner: a ray that ends
             // past the plane has a positive one too.
@@ -192,7 +182,7 @@ fn triangle_by_triangle<S: Simd, const N: usize>(
     shaft: &Shaft,
     rays: &Rays<N>,
     block: &Block,
-    found: &Candidates,
+    found: &Candidates<S>,
     through: u64,
     masked: u32,
     solid: impl Fn(usize, &Crossing) -> bool,
@@ -279,26 +269,26 @@ pub(super) fn closest<S: Simd, C: Cutout, const N: usize>(
     let root = tree.root?;
     let lanes = ShaftLanes::new(simd, shaft);
     let direction = Vec3::from_array(rays.ends.each_ref().map(|axis| axis[0]));
-    let mut found = Candidates::NONE;
     let mut best: Option<First> = None;
     let mut spans = [[0.0; WIDTH]; 4];
     // z grows with t. The bound is one relative ulp wider than the product, which is rounded once.
     let z_of = |t: f64| (t * f64::from(direction.z) * (1.0 + f64::from(ERROR))) as f32;
     let mut z_max = z_of(t_max);
-    let mut inline = [(root, 0.0_f32); INLINE_STACK];
+    let (mut inline_links, mut inline_depths) = ([Link::NONE; INLINE_STACK], [0.0_f32; INLINE_STACK]);
     let mut allocated;
-    let stack = if tree.stack <= INLINE_STACK {
-        &mut inline[..]
+    let (links, depths) = if tree.stack <= INLINE_STACK {
+        (&mut inline_links[..], &mut inline_depths[..])
     } else {
-        allocated = vec![(root, 0.0); tree.stack];
-        &mut allocated[..]
+        allocated = (vec![Link::NONE; tree.stack], vec![0.0; tree.stack]);
+        (&mut allocated.0[..], &mut allocated.1[..])
     };
+    links[0] = root;
     {
         let mut height = 1;
         while height > 0 {
             height -= 1;
-            let (link, z) = stack[height];
-            if z > z_max {
+            let link = links[height];
+            if depths[height] > z_max {
                 continue;
             }
             if !link.is_leaf() {
@@ -311,21 +301,22 @@ pub(super) fn closest<S: Simd, C: Cutout, const N: usize>(
                     let child = hit.trailing_zeros() as usize;
                     hit &= hit - 1;
                     let mut at = height;
-                    while at > bottom && stack[at - 1].1 < near[child] {
-                        stack[at] = stack[at - 1];
+                    while at > bottom && depths[at - 1] < near[child] {
+                        (links[at], depths[at]) = (links[at - 1], depths[at - 1]);
                         at -= 1;
                     }
-                    stack[at] = (node.links[child], near[child]);
+                    (links[at], depths[at]) = (node.links[child], near[child]);
                     height += 1;
                 }
                 continue;
             }
             let block = &tree.blocks[link.index()];
-            cull(simd, shaft, &lanes, block, link.count(), &mut found);
+            let Some(found) = cull(simd, shaft, &lanes, block, link.count()) else { continue };
             let masked = cutout.map_or(0, |c| c.lanes(link.index()));
-            while found.lanes != 0 {
-                let lane = found.lanes.trailing_zeros() as usize;
-                found.lanes &= found.lanes - 1;
+            let mut left = found.lanes;
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize;
+                left &= left - 1;
                 let Some(crossing) = exact::crossing(shaft.corners(block, lane), direction) else { continue };
                 let triangle = tree.triangles[link.index()][lane];
                 let closer =
