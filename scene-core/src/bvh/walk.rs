@@ -73,37 +73,48 @@ pub(super) fn occluded<S: Simd, C: Cutout, const N: usize>(
         if through == 0 {
             continue;
         }
-        if !link.is_leaf() {
-            let node: &Node = &tree.nodes[link.index()];
-            let (mut hit, _) = if N == 1 {
-                lanes.children::<false>(node, &mut spans)
-            } else {
-                lanes.children::<true>(node, &mut spans)
-            };
-            while hit != 0 {
-                let child = hit.trailing_zeros() as usize;
-                hit &= hit - 1;
-                let through = if N == 1 { through } else { rays.within(simd, &spans, child, through) };
-                if through != 0 {
-                    (links[height], masks[height]) = (node.links[child], through);
-                    height += 1;
-                }
-            }
-            continue;
-        }
-        let block = &tree.blocks[link.index()];
-        let Some(found) = cull(simd, shaft, &lanes, block, link.count()) else { continue };
-        let masked = cutout.map_or(0, |c| c.lanes(link.index()));
-        let solid = |lane: usize, crossing: &Crossing| {
-            cutout.is_none_or(|c| c.is_solid(link.index(), lane, crossing))
-        };
-        alive &= !if through.count_ones() < 2 * found.lanes.count_ones() {
-            ray_by_ray(simd, shaft, rays, block, &found, through, masked, solid)
+        let node: &Node = &tree.nodes[link.index()];
+        let (hit, _) = if N == 1 {
+            lanes.children::<false>(node, &mut spans)
         } else {
-            triangle_by_triangle(simd, shaft, rays, block, &found, through, masked, solid)
+            lanes.children::<true>(node, &mut spans)
         };
-        if alive == 0 {
-            break;
+        let mut inner = hit & !node.leaves;
+        while inner != 0 {
+            let child = inner.trailing_zeros() as usize;
+            inner &= inner - 1;
+            let through = if N == 1 { through } else { rays.within(simd, &spans, child, through) };
+            if through != 0 {
+                (links[height], masks[height]) = (node.links[child], through);
+                height += 1;
+            }
+        }
+        // Leaves at once: what they block need not go on, and the processor foresees two plain loops better
+        // than one that does either.
+        let mut leaves = hit & node.leaves;
+        while leaves != 0 {
+            let child = leaves.trailing_zeros() as usize;
+            leaves &= leaves - 1;
+            let through = through & alive;
+            let through = if N == 1 { through } else { rays.within(simd, &spans, child, through) };
+            if through == 0 {
+                continue;
+            }
+            let link = node.links[child];
+            let block = &tree.blocks[link.index()];
+            let Some(found) = cull(simd, shaft, &lanes, block, link.count()) else { continue };
+            let masked = cutout.map_or(0, |c| c.lanes(link.index()));
+            let solid = |lane: usize, crossing: &Crossing| {
+                cutout.is_none_or(|c| c.is_solid(link.index(), lane, crossing))
+            };
+            alive &= !if through.count_ones() < 2 * found.lanes.count_ones() {
+                ray_by_ray(simd, shaft, rays, block, &found, through, masked, solid)
+            } else {
+                triangle_by_triangle(simd, shaft, rays, block, &found, through, masked, solid)
+            };
+            if alive == 0 {
+                return rays.mask;
+            }
         }
     }
     rays.mask & !alive
