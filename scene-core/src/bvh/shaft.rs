@@ -127,9 +127,9 @@ impl Shaft {
                 (across / along).store_slice(&mut rays.slopes[i][at.clone()]);
             }
         }
-        for i in 0..2 {
-            let (low, high) = range(simd, &rays.slopes[i], mask, groups);
-            slopes[i] = [low.next_down(), high.next_up()];
+        for (bounds, values) in slopes.iter_mut().zip(&rays.slopes) {
+            let (low, high) = range(simd, values, mask, groups);
+            *bounds = [low.next_down(), high.next_up()];
         }
         let mut shaft =
             Self { axes, flip, origin: axes.map(|a| origin[a]), slopes, lo: [0.0; 3], hi: [0.0; 3] };
@@ -267,8 +267,8 @@ impl<S: Simd> ShaftLanes<S> {
             let hi = relative(simd, &node.hi[self.axes[i]], self.origin[i]);
             let [low, high] = self.slopes[i];
             outside = outside | lo.simd_gt(self.hi[i]) | hi.simd_lt(self.lo[i]);
-            outside = outside | hi.simd_lt((low * near).min(low * far));
-            outside = outside | lo.simd_gt((high * near).max(high * far));
+            outside |= hi.simd_lt((low * near).min(low * far));
+            outside |= lo.simd_gt((high * near).max(high * far));
             if SPANS {
                 // Reciprocal and product are rounded, and so is the slope of a ray: 3 u.
                 let from = (lo * over_near).min(lo * over_far);
@@ -290,7 +290,7 @@ impl<S: Simd> ShaftLanes<S> {
             for axis in 0..3 {
                 corner[axis] = relative(self.simd, &values[self.axes[axis]], self.origin[axis]);
             }
-            corner[2] = corner[2] * self.flip;
+            corner[2] *= self.flip;
         }
         corners
     }
@@ -302,9 +302,9 @@ impl<S: Simd> ShaftLanes<S> {
             a[2].min(b[2]).min(c[2]).simd_gt(self.hi[2]) | a[2].max(b[2]).max(c[2]).simd_lt(self.lo[2]);
         for i in 0..2 {
             let across = [a[i], b[i], c[i]];
-            outside = outside | beside(across, [a[2], b[2], c[2]], self.slopes[i]);
-            outside = outside | across[0].min(across[1]).min(across[2]).simd_gt(self.hi[i]);
-            outside = outside | across[0].max(across[1]).max(across[2]).simd_lt(self.lo[i]);
+            outside |= beside(across, [a[2], b[2], c[2]], self.slopes[i]);
+            outside |= across[0].min(across[1]).min(across[2]).simd_gt(self.hi[i]);
+            outside |= across[0].max(across[1]).max(across[2]).simd_lt(self.lo[i]);
         }
         outside
     }
