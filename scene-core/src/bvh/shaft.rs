@@ -12,7 +12,7 @@
 //! * x < fl(m z) implies x < m z for any x of f32, again by monotonicity, so a corner that is found outside a
 //!   side plane of the pyramid is outside.
 
-use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8, mask32x8};
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x8, mask32x8};
 use glam::Vec3;
 
 use super::filter::{ERROR, TINY};
@@ -194,6 +194,9 @@ pub(super) struct ShaftLanes<S: Simd> {
     pub(super) flip: f32x8<S>,
     pub(super) origin: [f32x8<S>; 3],
     pub(super) slopes: [[f32x8<S>; 2]; 2],
+    /// What a slope that a box spans may be off by, where it is near a slope of the shaft: reciprocal, product and
+    /// the slope of a ray are rounded, 3 u in all.
+    slack: [f32x8<S>; 2],
     pub(super) lo: [f32x8<S>; 3],
     pub(super) hi: [f32x8<S>; 3],
 }
@@ -229,6 +232,7 @@ impl<S: Simd> ShaftLanes<S> {
             flip: f32x8::splat(simd, shaft.flip),
             origin: [zero; 3],
             slopes: [[zero; 2]; 2],
+            slack: [zero; 2],
             lo: [zero; 3],
             hi: [zero; 3],
         };
@@ -238,6 +242,8 @@ impl<S: Simd> ShaftLanes<S> {
             lanes.hi[axis] = f32x8::splat(simd, shaft.hi[axis]);
         }
         for axis in 0..2 {
+            let [from, to] = shaft.slopes[axis];
+            lanes.slack[axis] = f32x8::splat(simd, from.abs().max(to.abs()) * ERROR + TINY);
             for side in 0..2 {
                 lanes.slopes[axis][side] = f32x8::splat(simd, shaft.slopes[axis][side]);
             }
@@ -270,11 +276,8 @@ impl<S: Simd> ShaftLanes<S> {
             outside |= hi.simd_lt((low * near).min(low * far));
             outside |= lo.simd_gt((high * near).max(high * far));
             if SPANS {
-                // Reciprocal and product are rounded, and so is the slope of a ray: 3 u.
-                let from = (lo * over_near).min(lo * over_far);
-                let to = (hi * over_near).max(hi * over_far);
-                let from = from - from.abs().mul_add(ERROR, TINY);
-                let to = to + to.abs().mul_add(ERROR, TINY);
+                let from = (lo * over_near).min(lo * over_far) - self.slack[i];
+                let to = (hi * over_near).max(hi * over_far) + self.slack[i];
                 select(ahead, from, -one * f32::INFINITY).store_array(&mut spans[2 * i]);
                 select(ahead, to, one * f32::INFINITY).store_array(&mut spans[2 * i + 1]);
             }
