@@ -306,8 +306,6 @@ impl<S: Simd> ShaftLanes<S> {
         for i in 0..2 {
             let across = [a[i], b[i], c[i]];
             outside |= beside(across, [a[2], b[2], c[2]], self.slopes[i]);
-            outside |= across[0].min(across[1]).min(across[2]).simd_gt(self.hi[i]);
-            outside |= across[0].max(across[1]).max(across[2]).simd_lt(self.lo[i]);
         }
         outside
     }
