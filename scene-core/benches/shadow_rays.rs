@@ -1,7 +1,7 @@
 //! Shadow rays a second and core: packets, single rays and `obvhs`'s own traversal, on the same stored rays.
 //!
 //! The rays are those of a 256 × 256 image under a rectangular light. The dragon takes part if its mesh is
-//! found beside the workspace. The table that is printed first takes the least of several interleaved runs, so
+//! found in the folder that `GNOMON_SCENES` names, or in `shared/scenes` beside the workspace. The table that is printed first takes the least of several interleaved runs, so
 //! that its ratios hold on a machine that others use too.
 
 use std::hint::black_box;
@@ -16,7 +16,6 @@ use gnomon_scene_core::light::LightPoint;
 use obvhs::ray::Ray;
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
-use rayon::prelude::*;
 
 const SIDE: usize = 256;
 
@@ -75,7 +74,8 @@ fn cases() -> Vec<Case> {
         aim: Vec3::new(0.0, 0.8, 0.0),
         light: [Vec3::new(1.5, 5.0, 1.0), Vec3::X * 0.7, Vec3::Z * 0.7],
     }];
-    let dragon = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/scenes/dragon.obj");
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/scenes");
+    let dragon = std::env::var_os("GNOMON_SCENES").map_or(beside, Into::into).join("dragon.obj");
     if let Ok((models, _)) = tobj::load_obj(dragon, &tobj::GPU_LOAD_OPTIONS) {
         let mut mesh = TriangleMesh::default();
         for model in models {
@@ -194,11 +194,6 @@ fn by_tile(bvh: &Bvh, rays: &Rays) -> usize {
         .sum()
 }
 
-fn by_pixel_parallel(bvh: &Bvh, rays: &Rays) -> usize {
-    let pixels = rays.origins.par_iter().zip(rays.targets.par_chunks(rays.samples)).with_min_len(256);
-    pixels.map(|(&o, targets)| bvh.occluded_mask(o, targets).count_ones() as usize).sum()
-}
-
 /// Seconds this thread has spent on a processor, where the system tells: other programs do not disturb it.
 fn processor_seconds() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
@@ -212,6 +207,22 @@ fn time<R>(run: impl FnOnce() -> R) -> (f64, R) {
     (processor_seconds().zip(processor).map_or(wall, |(end, start)| end - start), result)
 }
 
+/// The longest that any of `threads` threads works, of which each takes every so-many-th run of 64 pixels.
+fn by_threads(bvh: &Bvh, rays: &Rays, threads: usize) -> (f64, usize) {
+    let share = |thread: usize| {
+        let pixels = rays.origins.chunks(64).zip(rays.targets.chunks(64 * rays.samples));
+        let mine = pixels.skip(thread).step_by(threads);
+        mine.flat_map(|(origins, targets)| origins.iter().zip(targets.chunks(rays.samples)))
+            .map(|(&o, targets)| bvh.occluded_mask(o, targets).count_ones() as usize)
+            .sum::<usize>()
+    };
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|t| scope.spawn(move || time(|| share(t)))).collect();
+        let results = workers.into_iter().map(|worker| worker.join().expect("a worker"));
+        results.fold((0.0, 0), |(most, sum), (seconds, blocked)| (seconds.max(most), sum + blocked))
+    })
+}
+
 fn wall_time<R>(run: impl FnOnce() -> R) -> (f64, R) {
     let start = Instant::now();
     let result = black_box(run());
@@ -219,23 +230,20 @@ fn wall_time<R>(run: impl FnOnce() -> R) -> (f64, R) {
 }
 
 fn table(case: &Case, bvh: &Bvh, rival: &Rival) {
-    let pool = |n: usize| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads");
-    let (one, two) = (pool(1), pool(2));
     for side in [1, 4, 8] {
         let rays = rays(case, bvh, side);
         let mut least = [f64::INFINITY; 5];
         let mut blocked = [0; 5];
         for _ in 0..7 {
-            let runs: [&dyn Fn() -> usize; 5] = [
-                &|| by_rival(rival, &rays),
-                &|| one_by_one(bvh, &rays),
-                &|| if side == 1 { by_tile(bvh, &rays) } else { by_pixel(bvh, &rays) },
-                &|| one.install(|| by_pixel_parallel(bvh, &rays)),
-                &|| two.install(|| by_pixel_parallel(bvh, &rays)),
+            let runs: [&dyn Fn() -> (f64, usize); 5] = [
+                &|| time(|| by_rival(rival, &rays)),
+                &|| time(|| one_by_one(bvh, &rays)),
+                &|| time(|| if side == 1 { by_tile(bvh, &rays) } else { by_pixel(bvh, &rays) }),
+                &|| by_threads(bvh, &rays, 1),
+                &|| by_threads(bvh, &rays, 2),
             ];
             for (i, run) in runs.into_iter().enumerate() {
-                // The thread that waits for a pool uses no processor.
-                let (seconds, count) = if i < 3 { time(run) } else { wall_time(run) };
+                let (seconds, count) = run();
                 least[i] = least[i].min(seconds);
                 blocked[i] = count;
             }

@@ -6,7 +6,8 @@
 //!
 //! # Error bound
 //!
-//! Let u = 2⁻²⁴, and let P be n with every product taken absolute: P_x = |s_y e_z| + |s_z e_y| and so on, for sum s and difference e.
+//! Let u = 2⁻²⁴, s the sum and e the difference of the corners, and P their cross product n with every product
+//! taken absolute: |s.y e.z| + |s.z e.y| and so on.
 //! Difference and sum are rounded once (1 u each), the products and their difference once more (2 u), so
 //! |δn| ≤ 4 u P. The slopes are rounded (1 u), multiplied (1 u) and summed (2 u), and |n| ≤ P. In all
 //! |δ(n·r)| ≤ 8 u P·|r| + O(u²), with or without fused multiply-add. 12 u P·|r| also covers the rounding of
@@ -29,7 +30,7 @@ pub(super) const TINY: f32 = f32::from_bits((127 - 100) << 23);
 pub(super) struct Candidates<S: Simd> {
     /// Lanes that some ray of the shaft may cross.
     pub(super) lanes: u32,
-    /// Per edge n_x, n_y and n_z + B, turned so that inside is positive; B is the edge's error bound.
+    /// Per edge n.x, n.y and n.z + B, turned so that inside is positive; B is the edge's error bound.
     pub(super) edges: [[f32x8<S>; 3]; 3],
     /// Per edge 2 B.
     pub(super) twice_bound: [f32x8<S>; 3],

@@ -172,9 +172,6 @@ impl Masks {
             }
             masks.blocks[link.index()] = (lanes, first);
         };
-        if let Some(root) = tree.root.filter(|root| root.is_leaf()) {
-            leaf(root);
-        }
         for node in &tree.nodes {
             node.links[..node.count as usize]
                 .iter()

@@ -12,7 +12,7 @@
 //! * x < fl(m z) implies x < m z for any x of f32, again by monotonicity, so a corner that is found outside a
 //!   side plane of the pyramid is outside.
 
-use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8, mask32x8};
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x8, mask32x8};
 use glam::Vec3;
 
 use super::filter::{ERROR, TINY};
@@ -127,9 +127,9 @@ impl Shaft {
                 (across / along).store_slice(&mut rays.slopes[i][at.clone()]);
             }
         }
-        for i in 0..2 {
-            let (low, high) = range(simd, &rays.slopes[i], mask, groups);
-            slopes[i] = [low.next_down(), high.next_up()];
+        for (bounds, values) in slopes.iter_mut().zip(&rays.slopes) {
+            let (low, high) = range(simd, values, mask, groups);
+            *bounds = [low.next_down(), high.next_up()];
         }
         let mut shaft =
             Self { axes, flip, origin: axes.map(|a| origin[a]), slopes, lo: [0.0; 3], hi: [0.0; 3] };
@@ -194,6 +194,9 @@ pub(super) struct ShaftLanes<S: Simd> {
     pub(super) flip: f32x8<S>,
     pub(super) origin: [f32x8<S>; 3],
     pub(super) slopes: [[f32x8<S>; 2]; 2],
+    /// What a slope that a box spans may be off by, where it is near a slope of the shaft: reciprocal, product and
+    /// the slope of a ray are rounded, 3 u in all.
+    slack: [f32x8<S>; 2],
     pub(super) lo: [f32x8<S>; 3],
     pub(super) hi: [f32x8<S>; 3],
 }
@@ -229,6 +232,7 @@ impl<S: Simd> ShaftLanes<S> {
             flip: f32x8::splat(simd, shaft.flip),
             origin: [zero; 3],
             slopes: [[zero; 2]; 2],
+            slack: [zero; 2],
             lo: [zero; 3],
             hi: [zero; 3],
         };
@@ -238,6 +242,8 @@ impl<S: Simd> ShaftLanes<S> {
             lanes.hi[axis] = f32x8::splat(simd, shaft.hi[axis]);
         }
         for axis in 0..2 {
+            let [from, to] = shaft.slopes[axis];
+            lanes.slack[axis] = f32x8::splat(simd, from.abs().max(to.abs()) * ERROR + TINY);
             for side in 0..2 {
                 lanes.slopes[axis][side] = f32x8::splat(simd, shaft.slopes[axis][side]);
             }
@@ -267,14 +273,11 @@ impl<S: Simd> ShaftLanes<S> {
             let hi = relative(simd, &node.hi[self.axes[i]], self.origin[i]);
             let [low, high] = self.slopes[i];
             outside = outside | lo.simd_gt(self.hi[i]) | hi.simd_lt(self.lo[i]);
-            outside = outside | hi.simd_lt((low * near).min(low * far));
-            outside = outside | lo.simd_gt((high * near).max(high * far));
+            outside |= hi.simd_lt((low * near).min(low * far));
+            outside |= lo.simd_gt((high * near).max(high * far));
             if SPANS {
-                // Reciprocal and product are rounded, and so is the slope of a ray: 3 u.
-                let from = (lo * over_near).min(lo * over_far);
-                let to = (hi * over_near).max(hi * over_far);
-                let from = from - from.abs().mul_add(ERROR, TINY);
-                let to = to + to.abs().mul_add(ERROR, TINY);
+                let from = (lo * over_near).min(lo * over_far) - self.slack[i];
+                let to = (hi * over_near).max(hi * over_far) + self.slack[i];
                 select(ahead, from, -one * f32::INFINITY).store_array(&mut spans[2 * i]);
                 select(ahead, to, one * f32::INFINITY).store_array(&mut spans[2 * i + 1]);
             }
@@ -290,7 +293,7 @@ impl<S: Simd> ShaftLanes<S> {
             for axis in 0..3 {
                 corner[axis] = relative(self.simd, &values[self.axes[axis]], self.origin[axis]);
             }
-            corner[2] = corner[2] * self.flip;
+            corner[2] *= self.flip;
         }
         corners
     }
@@ -302,9 +305,7 @@ impl<S: Simd> ShaftLanes<S> {
             a[2].min(b[2]).min(c[2]).simd_gt(self.hi[2]) | a[2].max(b[2]).max(c[2]).simd_lt(self.lo[2]);
         for i in 0..2 {
             let across = [a[i], b[i], c[i]];
-            outside = outside | beside(across, [a[2], b[2], c[2]], self.slopes[i]);
-            outside = outside | across[0].min(across[1]).min(across[2]).simd_gt(self.hi[i]);
-            outside = outside | across[0].max(across[1]).max(across[2]).simd_lt(self.lo[i]);
+            outside |= beside(across, [a[2], b[2], c[2]], self.slopes[i]);
         }
         outside
     }

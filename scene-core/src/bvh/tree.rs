@@ -65,6 +65,8 @@ pub(super) struct Node {
     pub(super) hi: [[f32; WIDTH]; 3],
     pub(super) links: [Link; WIDTH],
     pub(super) count: u32,
+    /// Which children are leaves, as bits.
+    pub(super) leaves: u32,
 }
 
 /// The corners of up to eight triangles: `corners[corner][axis][lane]`. Unused lanes are zero.
@@ -82,7 +84,7 @@ impl Block {
     }
 }
 
-/// Nodes, leaves and the root. `root` is `None` for a tree without triangles.
+/// Nodes and leaves. `root` leads to the first node; it is `None` for a tree without triangles.
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
     pub(super) nodes: Vec<Node>,
@@ -219,16 +221,13 @@ impl<'a> Collapse<'a> {
     }
 
     fn run(&self, tree: &mut Tree) {
-        if self.counts[0] as usize <= WIDTH {
-            tree.root = Some(self.leaf(0, tree));
-            return;
-        }
         tree.root = Some(Link::node(0));
         let empty = Node {
             lo: [[f32::INFINITY; WIDTH]; 3],
             hi: [[f32::NEG_INFINITY; WIDTH]; 3],
             links: [Link::NONE; WIDTH],
             count: 0,
+            leaves: 0,
         };
         tree.nodes.push(empty.clone());
         // Binary node, wide node, depth of the wide node.
@@ -246,6 +245,7 @@ impl<'a> Collapse<'a> {
                     node.hi[axis][slot] = bounds.max[axis];
                 }
                 node.links[slot] = if self.counts[child] as usize <= WIDTH {
+                    node.leaves |= 1 << slot;
                     self.leaf(child, tree)
                 } else {
                     tree.nodes.push(empty.clone());

@@ -54,8 +54,8 @@ pub(super) fn occluded<S: Simd, C: Cutout, const N: usize>(
     let lanes = ShaftLanes::new(simd, shaft);
     let mut alive = rays.mask;
     let mut spans = [[0.0; WIDTH]; 4];
-    // Closures would not be inlined, and leave the vector unit; hence no helper here.
-    // Two plain arrays, as filling one of pairs takes longer than many a walk.
+    // Two plain arrays, as filling one of pairs takes longer than many a walk; and no closure around the walk,
+    // as it would not be inlined, and what is not inlined does not use the vector unit.
     let (mut inline_links, mut inline_masks) = ([Link::NONE; INLINE_STACK], [0_u64; INLINE_STACK]);
     let mut allocated;
     let (links, masks) = if tree.stack <= INLINE_STACK {
@@ -73,37 +73,48 @@ pub(super) fn occluded<S: Simd, C: Cutout, const N: usize>(
         if through == 0 {
             continue;
         }
-        if !link.is_leaf() {
-            let node: &Node = &tree.nodes[link.index()];
-            let (mut hit, _) = if N == 1 {
-                lanes.children::<false>(node, &mut spans)
-            } else {
-                lanes.children::<true>(node, &mut spans)
-            };
-            while hit != 0 {
-                let child = hit.trailing_zeros() as usize;
-                hit &= hit - 1;
-                let through = if N == 1 { through } else { rays.within(simd, &spans, child, through) };
-                if through != 0 {
-                    (links[height], masks[height]) = (node.links[child], through);
-                    height += 1;
-                }
-            }
-            continue;
-        }
-        let block = &tree.blocks[link.index()];
-        let Some(found) = cull(simd, shaft, &lanes, block, link.count()) else { continue };
-        let masked = cutout.map_or(0, |c| c.lanes(link.index()));
-        let solid = |lane: usize, crossing: &Crossing| {
-            cutout.is_none_or(|c| c.is_solid(link.index(), lane, crossing))
-        };
-        alive &= !if through.count_ones() < 2 * found.lanes.count_ones() {
-            ray_by_ray(simd, shaft, rays, block, &found, through, masked, solid)
+        let node: &Node = &tree.nodes[link.index()];
+        let (hit, _) = if N == 1 {
+            lanes.children::<false>(node, &mut spans)
         } else {
-            triangle_by_triangle(simd, shaft, rays, block, &found, through, masked, solid)
+            lanes.children::<true>(node, &mut spans)
         };
-        if alive == 0 {
-            break;
+        let mut inner = hit & !node.leaves;
+        while inner != 0 {
+            let child = inner.trailing_zeros() as usize;
+            inner &= inner - 1;
+            let through = if N == 1 { through } else { rays.within(simd, &spans, child, through) };
+            if through != 0 {
+                (links[height], masks[height]) = (node.links[child], through);
+                height += 1;
+            }
+        }
+        // Leaves at once: what they block need not go on, and the processor foresees two plain loops better
+        // than one that does either.
+        let mut leaves = hit & node.leaves;
+        while leaves != 0 {
+            let child = leaves.trailing_zeros() as usize;
+            leaves &= leaves - 1;
+            let through = through & alive;
+            let through = if N == 1 { through } else { rays.within(simd, &spans, child, through) };
+            if through == 0 {
+                continue;
+            }
+            let link = node.links[child];
+            let block = &tree.blocks[link.index()];
+            let Some(found) = cull(simd, shaft, &lanes, block, link.count()) else { continue };
+            let masked = cutout.map_or(0, |c| c.lanes(link.index()));
+            let solid = |lane: usize, crossing: &Crossing| {
+                cutout.is_none_or(|c| c.is_solid(link.index(), lane, crossing))
+            };
+            alive &= !if through.count_ones() < 2 * found.lanes.count_ones() {
+                ray_by_ray(simd, shaft, rays, block, &found, through, masked, solid)
+            } else {
+                triangle_by_triangle(simd, shaft, rays, block, &found, through, masked, solid)
+            };
+            if alive == 0 {
+                return rays.mask;
+            }
         }
     }
     rays.mask & !alive
@@ -283,53 +294,49 @@ pub(super) fn closest<S: Simd, C: Cutout, const N: usize>(
         (&mut allocated.0[..], &mut allocated.1[..])
     };
     links[0] = root;
-    {
-        let mut height = 1;
-        while height > 0 {
-            height -= 1;
-            let link = links[height];
-            if depths[height] > z_max {
-                continue;
-            }
-            if !link.is_leaf() {
-                let node = &tree.nodes[link.index()];
-                let (mut hit, near) = lanes.children::<false>(node, &mut spans);
-                let near = near.to_array();
-                // The nearest child ends on top: insertion into the few that are hit.
-                let bottom = height;
-                while hit != 0 {
-                    let child = hit.trailing_zeros() as usize;
-                    hit &= hit - 1;
-                    let mut at = height;
-                    while at > bottom && depths[at - 1] < near[child] {
-                        (links[at], depths[at]) = (links[at - 1], depths[at - 1]);
-                        at -= 1;
-                    }
-                    (links[at], depths[at]) = (node.links[child], near[child]);
-                    height += 1;
+    let mut height = 1;
+    while height > 0 {
+        height -= 1;
+        let link = links[height];
+        if depths[height] > z_max {
+            continue;
+        }
+        if !link.is_leaf() {
+            let node = &tree.nodes[link.index()];
+            let (mut hit, near) = lanes.children::<false>(node, &mut spans);
+            let near = near.to_array();
+            // The nearest child ends on top: insertion into the few that are hit.
+            let bottom = height;
+            while hit != 0 {
+                let child = hit.trailing_zeros() as usize;
+                hit &= hit - 1;
+                let mut at = height;
+                while at > bottom && depths[at - 1] < near[child] {
+                    (links[at], depths[at]) = (links[at - 1], depths[at - 1]);
+                    at -= 1;
                 }
-                continue;
+                (links[at], depths[at]) = (node.links[child], near[child]);
+                height += 1;
             }
-            let block = &tree.blocks[link.index()];
-            let Some(found) = cull(simd, shaft, &lanes, block, link.count()) else { continue };
-            let masked = cutout.map_or(0, |c| c.lanes(link.index()));
-            let mut left = found.lanes;
-            while left != 0 {
-                let lane = left.trailing_zeros() as usize;
-                left &= left - 1;
-                let Some(crossing) = exact::crossing(shaft.corners(block, lane), direction) else { continue };
-                let triangle = tree.triangles[link.index()][lane];
-                let closer =
-                    best.is_none_or(|best| (crossing.t, triangle) < (best.crossing.t, best.triangle));
-                let within = (t_min..=t_max).contains(&crossing.t);
-                let solid = || {
-                    masked >> lane & 1 == 0
-                        || cutout.is_none_or(|c| c.is_solid(link.index(), lane, &crossing))
-                };
-                if within && closer && solid() {
-                    best = Some(First { crossing, triangle });
-                    z_max = z_of(crossing.t);
-                }
+            continue;
+        }
+        let block = &tree.blocks[link.index()];
+        let Some(found) = cull(simd, shaft, &lanes, block, link.count()) else { continue };
+        let masked = cutout.map_or(0, |c| c.lanes(link.index()));
+        let mut left = found.lanes;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let Some(crossing) = exact::crossing(shaft.corners(block, lane), direction) else { continue };
+            let triangle = tree.triangles[link.index()][lane];
+            let closer = best.is_none_or(|best| (crossing.t, triangle) < (best.crossing.t, best.triangle));
+            let within = (t_min..=t_max).contains(&crossing.t);
+            let solid = || {
+                masked >> lane & 1 == 0 || cutout.is_none_or(|c| c.is_solid(link.index(), lane, &crossing))
+            };
+            if within && closer && solid() {
+                best = Some(First { crossing, triangle });
+                z_max = z_of(crossing.t);
             }
         }
     }
