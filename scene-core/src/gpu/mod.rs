@@ -9,11 +9,11 @@
 //! | [`layout`] | uniforms of cameras and lights |
 //! | [`timing`] | the recorder, time per stage |
 //! | [`shaders`] | the linked WGSL |
-//! | [`adapter`], [`readback`] | headless: a device without a window, reading back |
+//! | [`adapter`], [`readback`], [`headless`] | a device without a window, reading back, a whole frame |
 //! | [`testing`] | a device for tests, a runner for shader functions |
 //!
 //! # In somebody else's frame
-//! Nothing but the two headless modules creates a device, submits work, waits or reads back. A technique lives in
+//! Nothing but the three headless modules creates a device, submits work, waits or reads back. A technique lives in
 //! a renderer's own frame: device, encoder, depth pre-pass and lighting pass are the renderer's, textures and
 //! buffers too, and their formats are stated per field. Everything fits WebGPU's default limits and asks for no
 //! feature; timestamps are used where the device has them.
@@ -27,6 +27,7 @@ pub mod adapter;
 pub mod depth;
 mod error;
 pub mod gbuffer;
+pub mod headless;
 pub mod layout;
 mod pipeline;
 pub mod readback;
@@ -40,6 +41,7 @@ pub use adapter::Gpu;
 pub use depth::{DepthIds, DepthPass, DepthTarget};
 pub use error::GpuError;
 pub use gbuffer::{GBufferPass, GBufferTargets, GpuGBuffer};
+pub use headless::{HeadlessError, HeadlessFrame};
 pub use layout::{CameraUniform, DepthUniform, LightUniform};
 pub use scene::{GpuCutouts, GpuObject, GpuScene, SceneBuffers};
 pub use technique::{GpuShadowQuery, GpuShadowTechnique};

@@ -2,6 +2,7 @@
 #![cfg(feature = "gpu")]
 
 mod errors;
+mod headless;
 mod passes;
 mod shader_functions;
 mod shaders;
