@@ -51,16 +51,16 @@ fn edges_by_map(mesh: &TriangleMesh) -> usize {
     edges.len()
 }
 
-fn benches(c: &mut Criterion) {
+fn benches(criterion: &mut Criterion) {
     let meshes = [Some(ball(155)), Some(ball(318)), dragon(), Some(ball(660))];
     for mesh in meshes.iter().flatten() {
         let triangles = mesh.triangles.len();
         let label = format!("{}-{}k", mesh.name, triangles / 1000);
-        let mut group = c.benchmark_group("topology");
+        let mut group = criterion.benchmark_group("topology");
         group.sample_size(20).throughput(Throughput::Elements(triangles as u64));
 
         group.bench_function(BenchmarkId::new("weld", &label), |b| {
-            b.iter(|| weld(black_box(&mesh.positions)))
+            b.iter(|| weld(black_box(&mesh.positions)));
         });
         group.bench_function(BenchmarkId::new("edges", &label), |b| {
             b.iter(|| EdgeTopology::new(black_box(&mesh.positions), &mesh.triangles).unwrap());

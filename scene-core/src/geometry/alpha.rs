@@ -44,12 +44,14 @@ impl AlphaMask {
     /// A mask of `width` × `height` texels, row by row, from alpha values in [0, 255]; solid where
     /// `alpha >= cutoff × 255`. `None` if a side is zero or `alpha` has another length.
     pub fn from_alpha(width: u32, height: u32, alpha: &[u8], cutoff: f32, wrap: [Wrap; 2]) -> Option<Self> {
-        let texels = (width as usize).checked_mul(height as usize)?;
-        if texels == 0 || alpha.len() != texels {
-            return None;
-        }
         let solid = alpha.iter().map(|&a| f32::from(a) >= cutoff * 255.0).collect();
-        Some(Self { width, height, wrap, solid })
+        Self::from_solid(width, height, solid, wrap)
+    }
+
+    /// A mask of `width` × `height` texels, row by row. `None` if a side is zero or `solid` has another length.
+    pub fn from_solid(width: u32, height: u32, solid: Vec<bool>, wrap: [Wrap; 2]) -> Option<Self> {
+        let texels = (width as usize).checked_mul(height as usize)?;
+        (texels > 0 && solid.len() == texels).then_some(Self { width, height, wrap, solid })
     }
 
     /// Texels a row.

@@ -4,14 +4,18 @@ mod aabb;
 mod alpha;
 mod facing;
 mod mesh;
+mod repair;
 mod scene;
 mod topology;
+mod triangulate;
 mod weld;
 
 pub use aabb::Aabb;
 pub use alpha::{AlphaMask, Wrap};
 pub use facing::{facing, facing_of};
 pub use mesh::{MeshError, TriangleMesh};
+pub use repair::{Repairs, drop_unused_vertices, remove_faulty_faces};
 pub use scene::{Object, ObjectFlags, Scene, SceneError};
 pub use topology::{EdgeStatistics, EdgeTopology, Incidence, SilhouetteEdge, TopologyError};
+pub use triangulate::{MAX_CROSSING, PolygonFault, Repair, triangulate};
 pub use weld::{Weld, weld};

@@ -4,9 +4,7 @@ use std::time::Instant;
 
 use thiserror::Error;
 
-use super::{
-    GBufferPass, GBufferTargets, Gpu, GpuError, GpuShadowQuery, Recorder, SceneBuffers, StageTimer,
-};
+use super::{GBufferPass, GBufferTargets, Gpu, GpuError, GpuShadowQuery, Recorder, SceneBuffers, StageTimer};
 use crate::technique::{ShadowQuery, ShadowTechnique, TechniqueError};
 use crate::{GBuffer, Report, VisibilityImage};
 
@@ -52,12 +50,10 @@ impl Gpu {
     ) -> Result<HeadlessFrame, HeadlessError> {
         let camera = query.camera;
         let buffers = self.scoped("scene upload", || SceneBuffers::new(&self.device, query.scene))??;
-        let targets = self.scoped("the G-buffer", || {
-            GBufferTargets::new(&self.device, camera.width, camera.height)
-        })?;
+        let targets =
+            self.scoped("the G-buffer", || GBufferTargets::new(&self.device, camera.width, camera.height))?;
         let visibility = self.scoped("the visibility texture", || self.visibility_texture(&targets))?;
-        let mut on_gpu =
-            self.scoped("pipelines", || technique.gpu(&self.device, VISIBILITY_FORMAT))??;
+        let mut on_gpu = self.scoped("pipelines", || technique.gpu(&self.device, VISIBILITY_FORMAT))??;
         let mut timer = StageTimer::new(&self.device, &self.queue, TIMED_PASSES);
         let scene = buffers.view(Some(query.scene));
 

@@ -143,8 +143,31 @@ pub fn render_depth_into(
     draw(&drawing, casters(scene, options), scratch, bands);
 }
 
-/// [`render_depth_into`], and into `objects` the id of the object that is seen, [`GBuffer::NOTHING`] where there
-/// is none. Of equally near surfaces the one with the lowest triangle index is seen.
+/// [`render_depth_into`], and into `triangles` the triangle that is seen, [`GBuffer::NOTHING`] where there is
+/// none. Of equally near surfaces the one with the lowest triangle index is seen.
+///
+/// # Panics
+/// If a side is longer than [`MAX_SIDE`].
+pub fn render_depth_and_triangles_into(
+    scene: &Scene,
+    clip_from_world: Mat4,
+    options: &DepthOptions<'_>,
+    scratch: &mut RasterScratch,
+    target: &mut DepthMap,
+    triangles: &mut Vec<u32>,
+) {
+    let drawing = drawing(scene, clip_from_world, options, target.width, target.height);
+    let band = band_pixels(target);
+    triangles.resize(target.depth.len(), GBuffer::NOTHING);
+    let bands = target
+        .depth
+        .par_chunks_mut(band)
+        .zip(triangles.par_chunks_mut(band))
+        .map(|(depth, triangle)| TrianglePixels { depth: depth_pixels(depth, options), triangle });
+    draw(&drawing, casters(scene, options), scratch, bands);
+}
+
+/// [`render_depth_and_triangles_into`], with the id of the triangle's object in its place.
 ///
 /// # Panics
 /// If a side is longer than [`MAX_SIDE`].
@@ -156,15 +179,8 @@ pub fn render_depth_and_objects_into(
     target: &mut DepthMap,
     objects: &mut Vec<u32>,
 ) {
-    let drawing = drawing(scene, clip_from_world, options, target.width, target.height);
+    render_depth_and_triangles_into(scene, clip_from_world, options, scratch, target, objects);
     let band = band_pixels(target);
-    objects.resize(target.depth.len(), GBuffer::NOTHING);
-    let bands = target
-        .depth
-        .par_chunks_mut(band)
-        .zip(objects.par_chunks_mut(band))
-        .map(|(depth, triangle)| TrianglePixels { depth: depth_pixels(depth, options), triangle });
-    draw(&drawing, casters(scene, options), scratch, bands);
     objects.par_chunks_mut(band).for_each(|objects| {
         // Neighbours mostly see the same object.
         let (mut range, mut id) = (0..0, GBuffer::NOTHING);

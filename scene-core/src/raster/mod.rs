@@ -3,7 +3,7 @@
 //! | function | what it draws |
 //! | --- | --- |
 //! | [`render_depth`], [`render_depth_into`] | nearest depth of the casters, as a shadow map holds it |
-//! | [`render_depth_and_objects_into`] | the same, and which object is nearest |
+//! | [`render_depth_and_triangles_into`], [`render_depth_and_objects_into`] | the same, and which triangle or object is nearest |
 //! | [`render_gbuffer`] | what a camera sees of all objects |
 //! | [`count_layers`] | front and back faces over every pixel |
 //!
@@ -53,7 +53,7 @@ mod spans;
 
 pub use depth::{
     Cull, DEPTH_POSITION_ERROR, DepthConvention, DepthMap, DepthOptions, DepthRange, depth_error,
-    render_depth, render_depth_and_objects_into, render_depth_into,
+    render_depth, render_depth_and_objects_into, render_depth_and_triangles_into, render_depth_into,
 };
 pub use draw::RasterScratch;
 pub use gbuffer::{render_gbuffer, render_gbuffer_with};

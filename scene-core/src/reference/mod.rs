@@ -3,10 +3,14 @@
 //! [`reference`] is what every technique is held against: V by many shadow rays a pixel, with an estimate of
 //! its own error. [`valid_pixels`] says where a comparison means anything.
 
+mod exact;
 mod occlusion;
 mod sampled;
+mod tiles;
 mod valid;
 
-pub use occlusion::Occlusion;
-pub use sampled::{Cancelled, Reference, ReferenceSettings, no_progress, reference};
+pub use exact::{ExactError, exact_reference};
+pub use occlusion::{CasterSearch, Occlusion};
+pub use sampled::{ReferenceSettings, reference};
+pub use tiles::{Cancelled, Reference, no_progress};
 pub use valid::valid_pixels;

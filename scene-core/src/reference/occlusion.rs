@@ -1,15 +1,33 @@
-//! What ground truth asks of a ray tracer, so that an analytic shape can stand in for one.
+//! What ground truth asks of a spatial index. The [`Bvh`] answers; in tests an analytic shape can.
 
 use glam::Vec3;
 
+use crate::bvh::Bvh;
+use crate::geometry::Aabb;
 use crate::light::LightPoint;
 
 /// Something that blocks light.
 pub trait Occlusion: Sync {
-    /// Where a shadow ray starts that belongs to a surface point with the unit normal `normal` (turned to the
-    /// viewer), so that the surface does not block itself. A shape without rounding starts on the surface.
-    fn shadow_origin(&self, position: Vec3, normal: Vec3) -> Vec3;
-
     /// Sets `blocked[i]` to whether anything lies between `origin` and `targets[i]`. Slices of equal length.
     fn occluded_from(&self, origin: Vec3, targets: &[LightPoint], blocked: &mut [bool]);
+}
+
+/// Something that finds the casters near a region.
+pub trait CasterSearch: Sync {
+    /// Walks nested boxes from the outside in: `enter` says of each whether to look inside, `triangle` is given
+    /// every triangle (an index into [`Scene::triangles`](crate::Scene::triangles)) that throws shadows in the boxes
+    /// entered.
+    fn visit(&self, enter: impl FnMut(Aabb) -> bool, triangle: impl FnMut(u32));
+}
+
+impl Occlusion for Bvh {
+    fn occluded_from(&self, origin: Vec3, targets: &[LightPoint], blocked: &mut [bool]) {
+        self.occluded_from(origin, targets, blocked);
+    }
+}
+
+impl CasterSearch for Bvh {
+    fn visit(&self, enter: impl FnMut(Aabb) -> bool, triangle: impl FnMut(u32)) {
+        self.visit(enter, triangle);
+    }
 }

@@ -1,17 +1,16 @@
 //! Ground truth by stratified shadow rays.
 
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::Vec3;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use super::Occlusion;
+use super::tiles::{Cancelled, Estimate, Reference, estimate_tiles};
+use crate::bvh::shadow_origin;
 use crate::light::LightPoint;
 use crate::light::sampling::{LightView, SampleKey, Strata};
-use crate::{GBuffer, Light, Scene, VisibilityImage};
+use crate::{GBuffer, Light, Scene};
 
 /// How ground truth is sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,32 +27,6 @@ impl Default for ReferenceSettings {
     fn default() -> Self {
         Self { samples: 256, seed: 0 }
     }
-}
-
-/// Ground truth with an estimate of its own error.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Reference {
-    /// V of every pixel that sees a surface; NaN elsewhere.
-    pub visibility: VisibilityImage,
-    /// Per pixel the estimated standard error of V; NaN where nothing is seen.
-    ///
-    /// Its square is an unbiased estimate of the variance of V: the two samples of a stratum are independent, so
-    /// their differences measure what stratification leaves. It is 0 where the samples of every stratum agree.
-    /// For a light without extent that is the truth. If all samples of an extended light are lit (or all dark),
-    /// what they missed is a share of it above 3 / samples with a chance below e⁻³ = 5 %.
-    pub std_error: Vec<f32>,
-    /// Shadow rays traced. Samples below a surface's tangent plane or outside a spot's cone need none.
-    pub rays: u64,
-}
-
-/// The work was stopped by its progress callback.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[error("cancelled")]
-pub struct Cancelled;
-
-/// A progress callback that does nothing.
-pub fn no_progress(_fraction: f32) -> ControlFlow<()> {
-    ControlFlow::Continue(())
 }
 
 /// V of `light` for every pixel of `gbuffer` that sees a surface, blocked by `casters`.
@@ -74,69 +47,10 @@ pub fn reference(
     settings: &ReferenceSettings,
     progress: &(dyn Fn(f32) -> ControlFlow<()> + Sync),
 ) -> Result<Reference, Cancelled> {
-    let tracer = Tracer { scene, casters, light, gbuffer, settings };
-    let tiles_x = gbuffer.width.div_ceil(TILE);
-    let tiles = tiles_x as usize * gbuffer.height.div_ceil(TILE) as usize;
-    let done = AtomicUsize::new(0);
-    let traced: Vec<Tile> = (0..tiles)
-        .into_par_iter()
-        .map_init(Scratch::default, |scratch, index| {
-            let (x, y) = (index as u32 % tiles_x * TILE, index as u32 / tiles_x * TILE);
-            let tile = tracer.tile(x, y, scratch);
-            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            match progress(done as f32 / tiles as f32) {
-                ControlFlow::Continue(()) => Ok(tile),
-                ControlFlow::Break(()) => Err(Cancelled),
-            }
-        })
-        .collect::<Result<_, _>>()?;
-
-    let mut visibility = VisibilityImage::new(gbuffer.width, gbuffer.height);
-    let mut std_error = visibility.values.clone();
-    let mut rays = 0;
-    for (index, tile) in traced.iter().enumerate() {
-        let (x, y) = (index as u32 % tiles_x * TILE, index as u32 / tiles_x * TILE);
-        rays += tile.rays;
-        for (pixel, estimate) in tile_pixels(gbuffer, x, y).zip(&tile.estimates) {
-            if let Some(estimate) = estimate {
-                visibility.values[pixel] = estimate.visibility;
-                std_error[pixel] = estimate.std_error;
-            }
-        }
-    }
-    Ok(Reference { visibility, std_error, rays })
-}
-
-/// Side of the tiles that threads take, in pixels: small enough to balance, large enough that neighbours' rays
-/// find the same nodes in the cache.
-const TILE: u32 = 16;
-
-/// Indices of the pixels of the tile whose first one is (`x`, `y`), row by row.
-fn tile_pixels(gbuffer: &GBuffer, x: u32, y: u32) -> impl Iterator<Item = usize> + use<> {
-    let width = gbuffer.width;
-    let columns = x..(x + TILE).min(width);
-    (y..(y + TILE).min(gbuffer.height)).flat_map(move |row| {
-        columns.clone().map(move |column| row as usize * width as usize + column as usize)
+    let tracer = Tracer { casters, light, gbuffer, settings, magnitude: scene.bounds().magnitude() };
+    estimate_tiles(scene, light, gbuffer, progress, Scratch::default, |pixel, scratch, rays| {
+        tracer.pixel(pixel, scratch, rays)
     })
-}
-
-/// What was found for one pixel.
-#[derive(Clone, Copy)]
-struct Estimate {
-    visibility: f32,
-    std_error: f32,
-}
-
-impl Estimate {
-    fn certain(visibility: f32) -> Self {
-        Self { visibility, std_error: 0.0 }
-    }
-}
-
-/// A finished tile: an estimate for each pixel that sees a surface.
-struct Tile {
-    estimates: Vec<Option<Estimate>>,
-    rays: u64,
 }
 
 /// A thread's buffers, kept from pixel to pixel.
@@ -153,31 +67,17 @@ struct Scratch {
 }
 
 struct Tracer<'a, O> {
-    scene: &'a Scene,
     casters: &'a O,
     light: &'a Light,
     gbuffer: &'a GBuffer,
     settings: &'a ReferenceSettings,
+    /// Largest coordinate of the scene.
+    magnitude: f32,
 }
 
 impl<O: Occlusion> Tracer<'_, O> {
-    fn tile(&self, x: u32, y: u32, scratch: &mut Scratch) -> Tile {
-        let mut rays = 0;
-        let estimates = tile_pixels(self.gbuffer, x, y)
-            .map(|pixel| self.gbuffer.is_seen(pixel).then(|| self.pixel(pixel, scratch, &mut rays)))
-            .collect();
-        Tile { estimates, rays }
-    }
-
     fn pixel(&self, pixel: usize, scratch: &mut Scratch, rays: &mut u64) -> Estimate {
-        let object = self.scene.objects().get(self.gbuffer.object[pixel] as usize);
-        if object.is_some_and(|o| !o.flags.receives) {
-            return Estimate::certain(1.0);
-        }
         let (position, normal) = (self.gbuffer.position[pixel], self.gbuffer.normal[pixel]);
-        if !self.light.reaches(position) {
-            return Estimate::certain(0.0);
-        }
         let view = LightView::new(self.light, position);
         let strata = if view.is_single() {
             Strata::new(1, 1.0)
@@ -190,11 +90,15 @@ impl<O: Occlusion> Tracer<'_, O> {
         *rays += self.trace(position, normal, scratch);
 
         let seen = scratch.seen.iter().filter(|&&s| s).count();
+        let n = samples as f32;
+        let visibility = seen as f32 / n;
+        if view.is_single() {
+            return Estimate::certain(visibility);
+        }
         // A stratum's mean (a + b)/2 has the variance (a − b)²/4, so the mean over n/2 strata has the number
         // of strata that disagree over n².
         let split = scratch.seen.chunks_exact(2).filter(|pair| pair[0] != pair[1]).count();
-        let n = samples as f32;
-        Estimate { visibility: seen as f32 / n, std_error: (split as f32).sqrt() / n }
+        Estimate { visibility, std_error: (split.max(1) as f32).sqrt() / n }
     }
 
     /// Sets `scratch.seen` for all of `scratch.points`; returns how many rays it took.
@@ -216,7 +120,7 @@ impl<O: Occlusion> Tracer<'_, O> {
         let above = sample_of.len();
         blocked.clear();
         blocked.resize(above, false);
-        let origin = self.casters.shadow_origin(position, normal);
+        let origin = shadow_origin(position, normal, self.magnitude);
         self.casters.occluded_from(origin, &points[..above], blocked);
         for (&sample, &blocked) in sample_of.iter().zip(&*blocked) {
             seen[sample as usize] = !blocked;
@@ -227,19 +131,19 @@ impl<O: Occlusion> Tracer<'_, O> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use glam::Affine3A;
+
     use super::*;
     use crate::TriangleMesh;
     use crate::geometry::ObjectFlags;
-    use glam::Affine3A;
+    use crate::reference::no_progress;
 
     /// The half-space x < 0 at height 1: blocks what crosses the plane y = 1 left of the edge x = 0.
     struct HalfPlane;
 
     impl Occlusion for HalfPlane {
-        fn shadow_origin(&self, position: Vec3, _normal: Vec3) -> Vec3 {
-            position
-        }
-
         fn occluded_from(&self, origin: Vec3, targets: &[LightPoint], blocked: &mut [bool]) {
             for (target, blocked) in targets.iter().zip(blocked) {
                 let (direction, end) = target.ray_from(origin);

@@ -30,7 +30,12 @@ pub use sobol::{sobol, sobol_of_seeds};
 pub use strata::Strata;
 pub use view::LightView;
 
+use glam::Vec2;
+
 use super::LightPoint;
+
+/// Points mapped at a time: small enough for the stack, large enough to forget the call.
+const BATCH: usize = 64;
 
 /// Fills `points` with one jittered point from each of `points.len()` parts of the light of equal measure.
 /// An empty slice stays empty.
@@ -43,7 +48,11 @@ pub fn stratified(view: &LightView, key: SampleKey, points: &mut [LightPoint]) {
 /// Fills `points` with the first `points.len()` points of a scrambled [`sobol`] sequence; any prefix of them is
 /// well spread too, powers of two best.
 pub fn low_discrepancy(view: &LightView, key: SampleKey, points: &mut [LightPoint]) {
-    for (index, point) in (0..).zip(points) {
-        *point = view.point(sobol(index, key));
+    let mut squares = [Vec2::ZERO; BATCH];
+    for (batch, points) in (0..).zip(points.chunks_mut(BATCH)) {
+        for (index, square) in (batch * BATCH as u32..).zip(&mut squares[..points.len()]) {
+            *square = sobol(index, key);
+        }
+        view.points(&squares, points);
     }
 }

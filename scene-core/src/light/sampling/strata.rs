@@ -1,7 +1,7 @@
 //! Jittered cells of equal area, for any number of samples.
 
 use super::key::BELOW_ONE;
-use super::{LightView, SampleKey};
+use super::{BATCH, LightView, SampleKey};
 use crate::light::LightPoint;
 use glam::Vec2;
 
@@ -45,16 +45,22 @@ impl Strata {
     /// # Panics
     /// If `points` is shorter.
     pub fn fill(&self, view: &LightView, key: SampleKey, points: &mut [LightPoint]) {
-        let points = &mut points[..self.sample_count()];
-        let mut index = 0;
+        let mut points = &mut points[..self.sample_count()];
+        let (mut squares, mut pending, mut index) = ([Vec2::ZERO; BATCH], 0, 0);
         self.for_each_cell(|corner, size| {
             for _ in 0..self.per_cell {
                 // A jitter just below 1 may round up to the square's edge.
-                let square = (corner + key.square(index) * size).min(Vec2::splat(BELOW_ONE));
-                points[index as usize] = view.point(square);
+                squares[pending] = (corner + key.square(index) * size).min(Vec2::splat(BELOW_ONE));
                 index += 1;
+                pending += 1;
+                if pending == BATCH {
+                    view.points(&squares, points);
+                    points = &mut std::mem::take(&mut points)[BATCH..];
+                    pending = 0;
+                }
             }
         });
+        view.points(&squares[..pending], points);
     }
 
     /// Calls `visit` with the lower corner and the size of every cell.

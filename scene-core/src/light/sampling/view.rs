@@ -23,8 +23,9 @@ enum Shape {
     /// `center + x·axis_u + y·axis_v` over the unit disk.
     Disk { center: Vec3, axis_u: Vec3, axis_v: Vec3 },
     /// The part of a sphere that is seen from outside. The axes have the sphere's radius as their length,
-    /// `axis_w` points to the receiver.
-    Cap { center: Vec3, axis_u: Vec3, axis_v: Vec3, axis_w: Vec3, sin: f32, cos: f32 },
+    /// `axis_w` points to the receiver. `sin` and `cos` are those of the half angle under which the receiver
+    /// sees the sphere, `height` is 1 − cos.
+    Cap { center: Vec3, axis_u: Vec3, axis_v: Vec3, axis_w: Vec3, sin: f32, cos: f32, height: f32 },
     /// A sphere from within: all directions. `offset` is the receiver's distance from the centre in radii.
     Inside { center: Vec3, axis_u: Vec3, axis_v: Vec3, axis_w: Vec3, offset: f32 },
     /// Directions about unit vector `axis_w`; `height` is 1 − cos of the angular radius.
@@ -69,32 +70,44 @@ impl LightView {
     /// The point of the light that `square`, in [0, 1]², stands for. Deterministic; NaN stays NaN.
     #[inline]
     pub fn point(&self, square: Vec2) -> LightPoint {
+        let mut point = [LightPoint::At(Vec3::NAN)];
+        self.points(&[square], &mut point);
+        point[0]
+    }
+
+    /// [`LightView::point`] of each of `squares`, as many as there is room for in `points`.
+    #[inline]
+    pub fn points(&self, squares: &[Vec2], points: &mut [LightPoint]) {
+        // The kind is told apart once, not once a point.
         match self.0 {
-            Shape::Single(point) => point,
+            Shape::Single(point) => map(squares, points, |_| point),
             Shape::Parallelogram { corner, edge_u, edge_v } => {
-                LightPoint::At(corner + edge_u * square.x + edge_v * square.y)
+                map(squares, points, |square| LightPoint::At(corner + edge_u * square.x + edge_v * square.y))
             }
-            Shape::Disk { center, axis_u, axis_v } => {
+            Shape::Disk { center, axis_u, axis_v } => map(squares, points, |square| {
                 let (disk, _) = concentric(square);
                 LightPoint::At(center + axis_u * disk.x + axis_v * disk.y)
+            }),
+            Shape::Cap { center, axis_u, axis_v, axis_w, sin, cos, height } => {
+                // At the receiver a direction's angle t from the axis has cos t = 1 − u·height with u uniform, and
+                // sin t = sin·s. The nearer hit lies at the centre's angle a from the axis,
+                // cos a = sin·s² + cos t·√(1 − s²) and sin a = s·(cos t − sin·√(1 − s²)); below, every
+                // difference of near-equal numbers is multiplied out, so that neither far nor near
+                // receivers lose digits.
+                let inverse = 1.0 / (1.0 + cos);
+                map(squares, points, |square| {
+                    let (disk, u) = concentric(square);
+                    let lower = u * height;
+                    let cos_t = 1.0 - lower;
+                    let stretch_squared = (2.0 - lower) * inverse;
+                    let root = ((1.0 - u) * (1.0 - lower * inverse)).sqrt();
+                    let lateral = stretch_squared.sqrt() * (cos * cos) / (cos_t + sin * root);
+                    let along = sin * u * stretch_squared + cos_t * root;
+                    let side = axis_u * disk.x + axis_v * disk.y;
+                    LightPoint::At(center + side * lateral + axis_w * along)
+                });
             }
-            Shape::Cap { center, axis_u, axis_v, axis_w, sin, cos } => {
-                // The cone that holds the sphere has the half angle asin(sin). At the receiver a direction's
-                // angle t from the axis has cos t = 1 − u·(1 − cos) with u uniform, and sin t = sin·s. The
-                // nearer hit lies at the centre's angle a from the axis, cos a = sin·s² + cos t·√(1 − s²) and
-                // sin a = s·(cos t − sin·√(1 − s²)); below, every difference of near-equal numbers is
-                // multiplied out, so that neither far nor near receivers lose digits.
-                let (disk, u) = concentric(square);
-                let height = sin * sin / (1.0 + cos);
-                let cos_t = 1.0 - u * height;
-                let stretch_squared = (2.0 - u * height) / (1.0 + cos);
-                let root = ((1.0 - u) * (1.0 + cos - u * (1.0 - cos)) / (1.0 + cos)).sqrt();
-                let lateral = stretch_squared.sqrt() * cos * cos / (cos_t + sin * root);
-                let along = sin * u * stretch_squared + cos_t * root;
-                let side = axis_u * disk.x + axis_v * disk.y;
-                LightPoint::At(center + side * lateral + axis_w * along)
-            }
-            Shape::Inside { center, axis_u, axis_v, axis_w, offset } => {
+            Shape::Inside { center, axis_u, axis_v, axis_w, offset } => map(squares, points, |square| {
                 let (disk, u) = concentric(square);
                 let cos_t = 1.0 - 2.0 * u;
                 let lateral = 2.0 * (1.0 - u).sqrt();
@@ -102,13 +115,14 @@ impl LightView {
                 let distance = (1.0 - offset * offset * sin_squared).max(0.0).sqrt() - offset * cos_t;
                 let side = (axis_u * disk.x + axis_v * disk.y) * lateral;
                 LightPoint::At(center + side * distance + axis_w * (cos_t * distance + offset))
-            }
-            Shape::Cone { axis_u, axis_v, axis_w, height } => {
+            }),
+            Shape::Cone { axis_u, axis_v, axis_w, height } => map(squares, points, |square| {
                 let (disk, u) = concentric(square);
                 let lateral = (height * (2.0 - u * height)).sqrt();
                 let direction = axis_w * (1.0 - u * height) + (axis_u * disk.x + axis_v * disk.y) * lateral;
-                LightPoint::Towards(direction.normalize())
-            }
+                // Of unit length but for rounding: a Newton step for 1/√ does what is left.
+                LightPoint::Towards(direction * (1.5 - 0.5 * direction.length_squared()))
+            }),
         }
     }
 
@@ -126,6 +140,13 @@ impl LightView {
     }
 }
 
+#[inline]
+fn map(squares: &[Vec2], points: &mut [LightPoint], point: impl Fn(Vec2) -> LightPoint) {
+    for (square, into) in squares.iter().zip(points) {
+        *into = point(*square);
+    }
+}
+
 /// The view of a sphere: its near cap from outside, all of its wall from inside.
 fn sphere(center: Vec3, radius: f32, receiver: Vec3) -> Shape {
     let r = f64::from(radius);
@@ -136,8 +157,9 @@ fn sphere(center: Vec3, radius: f32, receiver: Vec3) -> Shape {
     let [axis_u, axis_v, axis_w] = [axis_u, axis_v, axis_w].map(|axis| (axis * r).as_vec3());
     if distance > r {
         let sin = (r / distance) as f32;
-        let cos = (((distance - r) * (distance + r)).sqrt() / distance) as f32;
-        Shape::Cap { center, axis_u, axis_v, axis_w, sin, cos }
+        let cos = ((distance - r) * (distance + r)).sqrt() / distance;
+        let height = (r / distance).powi(2) / (1.0 + cos);
+        Shape::Cap { center, axis_u, axis_v, axis_w, sin, cos: cos as f32, height: height as f32 }
     } else {
         Shape::Inside { center, axis_u, axis_v, axis_w, offset: (distance / r) as f32 }
     }
@@ -150,10 +172,12 @@ fn concentric(square: Vec2) -> (Vec2, f32) {
     let p = 2.0 * square - 1.0;
     let x_leads = p.x.abs() > p.y.abs();
     let (radius, other) = if x_leads { (p.x, p.y) } else { (p.y, p.x) };
-    let ratio = if radius == 0.0 { 0.0 } else { other / radius };
+    // Nothing is divided by zero in the middle, and without a branch.
+    let ratio = other / if radius == 0.0 { 1.0 } else { radius };
     let (sin, cos) = sin_cos_eighth(std::f32::consts::FRAC_PI_4 * ratio);
-    let disk = if x_leads { Vec2::new(cos, sin) } else { Vec2::new(sin, cos) };
-    (disk * radius, radius * radius)
+    let (along, across) = (radius * cos, radius * sin);
+    let disk = if x_leads { Vec2::new(along, across) } else { Vec2::new(across, along) };
+    (disk, radius * radius)
 }
 
 /// Sine and cosine of an angle in [−π/4, π/4] by Taylor series. The first terms left out, x¹¹/11! and x¹⁰/10!,

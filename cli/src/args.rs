@@ -1,0 +1,261 @@
+//! The command line: what can be asked, and its help.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Real-time shadow techniques, measured against ray-traced ground truth.
+///
+/// Gnomon renders a scene with any of its shadow techniques, holds each against ground truth and says what it
+/// cost in milliseconds, bytes and error. What it measures is visibility: the fraction of a light that a
+/// point sees, 1 lit, 0 in full shadow (umbra), between them penumbra.
+#[derive(Debug, Parser)]
+#[command(
+    name = "gnomon",
+    version,
+    arg_required_else_help = true,
+    max_term_width = 100,
+    after_help = "\
+Examples:
+  gnomon compare dragon.obj            every technique beside ground truth, in out/dragon/index.html
+  gnomon render chess --technique shadow-map --out out/chess
+  gnomon reference cornell --samples 1024 --out out/truth
+  gnomon techniques shadow-map         its settings, their units, ranges and defaults
+  gnomon scenes                        built-in scenes and their parameters
+
+Exit codes: 0 done, 1 a check failed, 2 bad usage or input, 3 no GPU where one was required.
+If a command fails, none of its files are written."
+)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    pub(crate) global: GlobalArgs,
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// Options of every command.
+#[derive(Args, Debug)]
+pub(crate) struct GlobalArgs {
+    /// Print one JSON object on stdout and nothing else there (nothing if the command fails)
+    #[arg(long, global = true, help_heading = "Common options")]
+    pub(crate) json: bool,
+    /// Threads to compute with [default: one per core]
+    #[arg(
+        long,
+        global = true,
+        value_name = "N",
+        help_heading = "Common options",
+        value_parser = clap::value_parser!(u16).range(1..=1024)
+    )]
+    pub(crate) threads: Option<u16>,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Every technique beside ground truth: contact sheet, error maps, table, HTML page
+    Compare(CompareArgs),
+    /// Shadows of one light by one technique
+    Render(RenderArgs),
+    /// Ground truth: visibility by ray tracing, with an error estimate
+    Reference(ReferenceArgs),
+    /// Techniques with their settings, units, ranges, defaults and presets
+    Techniques(TechniquesArgs),
+    /// Built-in scenes and their parameters
+    #[command(after_help = "\
+Examples:
+  gnomon scenes
+  gnomon compare ball:height=1.2 --time 0.4      a scene with a parameter set, after 0.4 seconds")]
+    Scenes,
+}
+
+/// Which picture of which scene.
+#[derive(Args, Debug)]
+pub(crate) struct SceneArgs {
+    /// A scene file (.toml, .json), a mesh (.obj, .gltf, .glb) or a built-in scene (`gnomon scenes`)
+    ///
+    /// A bare mesh gets a ground, a camera and a light. A built-in scene takes parameters:
+    /// NAME:key=value,key=value. If a file has the name of a built-in scene, write ./NAME for
+    /// the file.
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: String,
+    /// Image size in pixels [default: the scene's]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub(crate) size: Option<(u32, u32)>,
+    /// Which of the scene's lights, counted from 0
+    #[arg(long, value_name = "INDEX", default_value_t = 0)]
+    pub(crate) light: usize,
+    /// Seconds by which what moves in a built-in scene has moved [default: 0]
+    #[arg(long, value_name = "T", value_parser = parse_time, allow_hyphen_values = true)]
+    pub(crate) time: Option<f32>,
+    /// Seed of all random choices: the same seed gives the same image, whatever the number of threads
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+}
+
+/// How ground truth is sampled.
+#[derive(Args, Debug)]
+pub(crate) struct TruthArgs {
+    /// Shadow rays a pixel, rounded up to an even number
+    ///
+    /// A light without extent takes one, whatever this says. The error falls about as N^-0.75.
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    pub(crate) samples: u32,
+}
+
+/// `gnomon compare`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  gnomon compare dragon.obj
+  gnomon compare cornell --size 256x256 --out out/cornell
+  gnomon compare scene.toml --techniques shadow-map,shadow-map@high --samples 1024
+
+Writes index.html (open it: a slider between any two images), contact-sheet.png, table.csv and report.json.
+
+Errors are taken over valid pixels: those whose surface faces the light (n·l > 0.05) with the whole light \
+above it. mae is the mean of |error|, rmse the root of its mean square, p99 its 99th percentile, pen_rmse the \
+rmse in and around penumbrae. Times are the fastest of up to three runs; ground truth runs once.")]
+pub(crate) struct CompareArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    #[command(flatten)]
+    pub(crate) truth: TruthArgs,
+    /// Techniques, separated by commas; NAME@PRESET takes a preset [default: all, in every variant]
+    #[arg(long, value_name = "A,B", value_delimiter = ',')]
+    pub(crate) techniques: Vec<String>,
+    /// Where techniques run
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) backend: Backend,
+    /// Error at which the error maps saturate
+    #[arg(long, value_name = "E", default_value_t = 0.5, value_parser = parse_error_scale)]
+    pub(crate) error_scale: f32,
+    /// Folder to write to [default: out/<scene name>]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// `gnomon render`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  gnomon render chess --technique shadow-map --out out/chess
+  gnomon render dragon.obj --technique shadow-map --set map_size=4096 --out out/dragon
+  gnomon render quads:count=5 --technique shadow-map --size 640x480 --json --out out/quads
+
+Writes image.png (shaded), visibility.png (grey, transparent where nothing is seen), visibility.npy (float32, \
+H×W, NaN where nothing is seen) and report.json (milliseconds per stage, bytes, what was skipped).")]
+pub(crate) struct RenderArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    /// The technique; `gnomon techniques` lists them
+    #[arg(long, value_name = "NAME")]
+    pub(crate) technique: String,
+    /// A rung of the technique's quality ladder, to start the settings from [default: the defaults]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) preset: Option<String>,
+    /// A setting, on top of the preset; may be repeated
+    #[arg(long, value_name = "KEY=VALUE", value_parser = parse_setting)]
+    pub(crate) set: Vec<(String, String)>,
+    /// Where the technique runs
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) backend: Backend,
+    /// Folder to write to; files of the same names are replaced
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}
+
+/// `gnomon reference`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  gnomon reference cornell --out out/truth
+  gnomon reference dragon.obj --samples 1024 --size 512x512 --out out/dragon-truth
+
+Writes image.png, visibility.png and report.json as `render` does, and NumPy arrays: visibility.npy and \
+std_error.npy (float32, H×W: V and the standard error of each pixel's V, NaN where nothing is seen), valid.npy \
+(bool, H×W: which pixels may be compared) and position.npy (float32, H×W×3: world-space positions).")]
+pub(crate) struct ReferenceArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    #[command(flatten)]
+    pub(crate) truth: TruthArgs,
+    /// Folder to write to; files of the same names are replaced
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}
+
+/// `gnomon techniques`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  gnomon techniques
+  gnomon techniques shadow-map --json")]
+pub(crate) struct TechniquesArgs {
+    /// Show this one only
+    pub(crate) name: Option<String>,
+}
+
+/// Where a technique runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Backend {
+    /// The GPU if the technique and the machine have one, else the CPU
+    #[default]
+    Auto,
+    /// The CPU
+    Cpu,
+    /// The GPU; exit code 3 if there is none
+    Gpu,
+}
+
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let max = scene_core::Camera::MAX_SIDE;
+    let side = |text: &str| text.parse().ok().filter(|side| (1..=max).contains(side));
+    text.split_once(['x', 'X', '×'])
+        .and_then(|(width, height)| Some((side(width)?, side(height)?)))
+        .ok_or_else(|| format!("give it as WIDTHxHEIGHT, each from 1 to {max}, such as 640x480"))
+}
+
+fn parse_time(text: &str) -> Result<f32, String> {
+    text.parse()
+        .ok()
+        .filter(|time: &f32| time.is_finite())
+        .ok_or_else(|| "give seconds, such as 1.5".to_owned())
+}
+
+fn parse_error_scale(text: &str) -> Result<f32, String> {
+    let in_range = |scale: &f32| (0.001..=1.0).contains(scale);
+    text.parse().ok().filter(in_range).ok_or_else(|| "give a number from 0.001 to 1".to_owned())
+}
+
+fn parse_setting(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
+        _ => Err("give it as KEY=VALUE, such as map_size=2048".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        use clap::CommandFactory;
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes() {
+        assert_eq!(parse_size("640x480"), Ok((640, 480)));
+        for bad in ["", "640", "0x4", "4x0", "-4x4", "4x4x4", "99999x4", "4 x 4", "axb"] {
+            assert!(parse_size(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn settings_keep_everything_after_the_first_equals_sign() {
+        assert_eq!(parse_setting("a=b=c"), Ok(("a".to_owned(), "b=c".to_owned())));
+        assert!(parse_setting("a").is_err() && parse_setting("=b").is_err());
+    }
+}

@@ -1,0 +1,7 @@
+//! The commands, one file each.
+
+pub(crate) mod compare;
+pub(crate) mod reference;
+pub(crate) mod render;
+pub(crate) mod scenes;
+pub(crate) mod techniques;

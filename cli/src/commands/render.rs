@@ -1,0 +1,52 @@
+//! `gnomon render`: the shadows of one light by one technique.
+
+use scene_core::io::write;
+use scene_core::raster::render_gbuffer;
+
+use crate::args::RenderArgs;
+use crate::compare::table::milliseconds;
+use crate::console::Console;
+use crate::error::CliError;
+use crate::output::OutputFolder;
+use crate::picture::shading::Shading;
+use crate::{measure, picture, scene_source, techniques};
+
+pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<(), CliError> {
+    let factory = techniques::find(&args.technique)?;
+    let overrides = techniques::with_seed(factory, &args.set, args.scene.seed);
+    let technique = factory.create(args.preset.as_deref(), &overrides)?;
+    measure::check_backend(technique.as_ref(), args.backend)?;
+    let out = OutputFolder::check(&args.out)?;
+    let view = scene_source::view(&args.scene, console)?;
+
+    let run = {
+        let _working = console.working(format!("rendering with {}", args.technique));
+        let gbuffer = render_gbuffer(&view.setup.scene, &view.setup.camera);
+        let run = measure::run(technique.as_ref(), &view, &gbuffer)?;
+        let shading = Shading::new(&gbuffer, &view.setup.camera, view.light());
+        let image = picture::png(shading.picture(&run.visibility))?;
+        let visibility = &run.visibility;
+        out.write(|to| {
+            write::bytes(&to.join("image.png"), &image)?;
+            write::visibility_png(&to.join("visibility.png"), visibility)?;
+            write::npy_f32(
+                &to.join("visibility.npy"),
+                &visibility.values,
+                visibility.width,
+                visibility.height,
+            )?;
+            write::json(&to.join("report.json"), &run.report)
+        })?;
+        run
+    };
+    let report = &run.report;
+    let text = format!(
+        "{}: {} {}, prepare {} ms, shade {} ms\n",
+        out.path().display(),
+        report.technique,
+        report.variant,
+        milliseconds(report.prepare_ms),
+        milliseconds(report.shade_ms),
+    );
+    console.result(report, &text)
+}

@@ -1,0 +1,134 @@
+//! Why a command could not do its work, and the exit code of each reason.
+
+use std::io;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use scene_core::camera::CameraError;
+use scene_core::io::write::WriteError;
+use scene_core::metrics::MetricsError;
+use scene_core::technique::{SettingsError, TechniqueError};
+use thiserror::Error;
+
+use crate::console;
+use crate::scene_source::SceneSourceError;
+
+/// A process exit code with a meaning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Exit(u8);
+
+/// Bad usage or input.
+pub(crate) const BAD_INPUT: Exit = Exit(2);
+/// A GPU was required and there is none.
+const NO_GPU: Exit = Exit(3);
+/// Whoever read stdout has gone: not a fault.
+const QUIET: Exit = Exit(0);
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit.0)
+    }
+}
+
+/// Why a command could not do its work.
+#[derive(Debug, Error)]
+pub(crate) enum CliError {
+    #[error(transparent)]
+    Scene(#[from] SceneSourceError),
+    #[error("{scene} has {}, counted from 0: there is no light {index}", count_of(*.lights, "light"))]
+    NoSuchLight { scene: String, index: usize, lights: usize },
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    #[error("there is no technique '{name}': there is {}", known.join(", "))]
+    NoSuchTechnique { name: String, known: Vec<&'static str> },
+    #[error("there is nothing to compare: --techniques names none")]
+    NoTechniques,
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    #[error(transparent)]
+    Technique(#[from] TechniqueError),
+    #[error("--backend gpu: {technique} has no GPU path in this build; take --backend cpu or auto")]
+    NoGpu { technique: &'static str },
+    #[error("the technique's image cannot be compared with ground truth")]
+    Metrics(#[from] MetricsError),
+    #[error("cancelled")]
+    Cancelled,
+    #[error("cannot start the threads: {0}")]
+    Threads(String),
+    #[error("cannot encode {what}")]
+    Encode {
+        what: &'static str,
+        #[source]
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    #[error("cannot write {}", path.display())]
+    Write {
+        path: PathBuf,
+        #[source]
+        source: io::Error,
+    },
+    #[error(transparent)]
+    Size(#[from] WriteError),
+    #[error("cannot write to stdout")]
+    Stdout(#[source] io::Error),
+}
+
+impl CliError {
+    /// The one place where a reason becomes an exit code.
+    fn exit(&self) -> Exit {
+        match self {
+            Self::Stdout(error) if error.kind() == io::ErrorKind::BrokenPipe => QUIET,
+            Self::NoGpu { .. } => NO_GPU,
+            _ => BAD_INPUT,
+        }
+    }
+
+    /// Tells the user in one line, causes after colons, and gives the exit code.
+    pub(crate) fn report(&self) -> ExitCode {
+        let exit = self.exit();
+        if exit != QUIET {
+            console::stderr_line(&format!("gnomon: {}", chain(self)));
+        }
+        exit.into()
+    }
+}
+
+/// An error and its causes in one line. A cause that its effect already quotes is not said twice.
+fn chain(error: &dyn std::error::Error) -> String {
+    let mut line = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        let text = error.to_string();
+        if !line.contains(&text) {
+            line.push_str(": ");
+            line.push_str(&text);
+        }
+        cause = error.source();
+    }
+    line.replace('\n', " ")
+}
+
+/// "1 light", "2 lights".
+pub(crate) fn count_of(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chain_is_one_line() {
+        let source = io::Error::other("disk\nfull");
+        let error = CliError::Write { path: "a.png".into(), source };
+        assert_eq!(chain(&error), "cannot write a.png: disk full");
+    }
+
+    #[test]
+    fn exit_codes() {
+        assert_eq!(CliError::NoGpu { technique: "psm" }.exit(), Exit(3));
+        assert_eq!(CliError::Camera(CameraError::NoUp).exit(), Exit(2));
+        let gone = io::Error::from(io::ErrorKind::BrokenPipe);
+        assert_eq!(CliError::Stdout(gone).exit(), Exit(0));
+    }
+}

@@ -1,0 +1,91 @@
+//! `report.json`: what was run, on what, and what it cost.
+
+use std::collections::BTreeMap;
+
+use scene_core::{Light, Report};
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::scene_source::View;
+
+/// Which light of the scene was looked at.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct LightReport {
+    /// Its place in the scene's list.
+    pub(crate) index: usize,
+    /// Its kind, as in a scene file.
+    pub(crate) kind: &'static str,
+    /// Whether it throws penumbrae.
+    pub(crate) extended: bool,
+}
+
+impl LightReport {
+    pub(crate) fn new(index: usize, light: &Light) -> Self {
+        Self { index, kind: light.kind(), extended: light.is_extended() }
+    }
+}
+
+/// One run of a technique, or of ground truth.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct RunReport {
+    /// The scene's name.
+    pub(crate) scene: String,
+    /// The light.
+    pub(crate) light: LightReport,
+    /// The technique's name, or `reference`.
+    pub(crate) technique: String,
+    /// The mode of it.
+    pub(crate) variant: String,
+    /// `cpu` or `gpu`.
+    pub(crate) backend: &'static str,
+    /// The GPU it ran on; none on the CPU.
+    pub(crate) adapter: Option<String>,
+    /// Every setting with its value.
+    pub(crate) settings: Value,
+    /// Milliseconds of each stage, `prepare.*` and `shade.*`.
+    pub(crate) stages_ms: BTreeMap<String, f64>,
+    /// Wall time of preparation.
+    pub(crate) prepare_ms: f64,
+    /// Wall time of shading.
+    pub(crate) shade_ms: f64,
+    /// Bytes held for this light.
+    pub(crate) bytes: u64,
+    /// What was skipped, and how many of it.
+    pub(crate) skipped: BTreeMap<String, u64>,
+    /// Triangles of the scene.
+    pub(crate) triangles: usize,
+    /// Pixels a row.
+    pub(crate) width: u32,
+    /// Rows.
+    pub(crate) height: u32,
+}
+
+/// What a [`RunReport`] is about, beside the view.
+pub(crate) struct Subject {
+    pub(crate) technique: String,
+    pub(crate) variant: String,
+    pub(crate) settings: Value,
+}
+
+impl RunReport {
+    /// A run on the CPU.
+    pub(crate) fn cpu(view: &View, subject: Subject, prepare_ms: f64, shade_ms: f64, report: Report) -> Self {
+        Self {
+            scene: view.setup.name.clone(),
+            light: LightReport::new(view.light_index, view.light()),
+            technique: subject.technique,
+            variant: subject.variant,
+            backend: "cpu",
+            adapter: None,
+            settings: subject.settings,
+            stages_ms: report.stages_ms,
+            prepare_ms,
+            shade_ms,
+            bytes: report.bytes,
+            skipped: report.skipped,
+            triangles: view.setup.scene.triangles().len(),
+            width: view.setup.camera.width,
+            height: view.setup.camera.height,
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! The `gnomon` command, run end to end.
+
+mod bad_input;
+mod compare;
+mod files;
+mod help;
+mod listings;
+mod streams;
+mod workbench;

@@ -1,0 +1,106 @@
+//! The closed forms again with triangles and the ray tracer, by samples and exactly.
+
+use std::f32::consts::{PI, TAU};
+
+use glam::{Affine3A, DVec2, DVec3, Vec3};
+use gnomon_scene_core::bvh::Bvh;
+use gnomon_scene_core::geometry::ObjectFlags;
+use gnomon_scene_core::reference::{exact_reference, no_progress};
+use gnomon_scene_core::{GBuffer, Light, Scene, TriangleMesh};
+
+use super::{BALL, assert_agreement, ball_truth, floor, formulas, square_over_plane};
+
+/// A caster on a floor at y = 0. The floor casts too: points on it must not shadow themselves.
+fn scene(caster: &TriangleMesh) -> Scene {
+    let mut scene = Scene::new();
+    let at = |x: f32, z: f32| Vec3::new(4.0 * x, 0.0, 4.0 * z);
+    for mesh in [&quad([at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)]), caster] {
+        scene.add(mesh, Affine3A::IDENTITY, ObjectFlags::default()).unwrap();
+    }
+    scene
+}
+
+fn quad(corners: [Vec3; 4]) -> TriangleMesh {
+    TriangleMesh::new("quad", corners.into(), vec![[0, 1, 2], [0, 2, 3]])
+}
+
+/// The part x < 0 of a sheet at height 1, large enough for every receiver.
+fn half_plane() -> TriangleMesh {
+    let at = |x: f32, z: f32| Vec3::new(x, 1.0, z);
+    quad([at(-4.0, -4.0), at(0.0, -4.0), at(0.0, 4.0), at(-4.0, 4.0)])
+}
+
+fn assert_traced(scene: &Scene, light: &Light, gbuffer: &GBuffer, truth: impl Fn(DVec3) -> f64) {
+    assert_agreement(scene, &Bvh::casters(scene), light, gbuffer, truth);
+}
+
+/// Exact V against the formula. Origins are lifted by 2⁻²¹ of the scene's largest coordinate, 4, which moves a shadow by
+/// as much times how fast it moves over the light; f32 receivers and results add some 10⁻⁷.
+fn assert_exact(scene: &Scene, light: &Light, gbuffer: &GBuffer, truth: impl Fn(DVec3) -> f64, bound: f64) {
+    let found = exact_reference(scene, &Bvh::casters(scene), light, gbuffer, &no_progress).unwrap();
+    for (&position, &v) in gbuffer.position.iter().zip(&found.visibility.values) {
+        let expected = truth(position.as_dvec3());
+        assert!((f64::from(v) - expected).abs() < bound, "V at {position} is {v}, not {expected}");
+    }
+    assert!(found.std_error.iter().all(|&e| e == 0.0));
+}
+
+#[test]
+fn half_plane_under_a_rect() {
+    let light = Light::Rect { center: Vec3::Y * 2.0, half_u: Vec3::X * 0.5, half_v: Vec3::Z * 1.5 };
+    let (scene, gbuffer) = (scene(&half_plane()), floor(3000, 0.7));
+    let truth = |x: DVec3| (0.5 + x.x).clamp(0.0, 1.0);
+    assert_traced(&scene, &light, &gbuffer, truth);
+    assert_exact(&scene, &light, &gbuffer, truth, 1e-5);
+}
+
+#[test]
+fn square_under_a_square() {
+    let (_, light, truth) = square_over_plane();
+    let corner = |u: f64, v: f64| {
+        let p = DVec2::from_angle(0.5).rotate(DVec2::new(u, v) * 0.25);
+        Vec3::new(p.x as f32, 1.0, p.y as f32)
+    };
+    let square = quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]);
+    let (scene, gbuffer) = (scene(&square), floor(3000, 1.2));
+    assert_traced(&scene, &light, &gbuffer, &truth);
+    assert_exact(&scene, &light, &gbuffer, &truth, 1e-5);
+}
+
+/// A sphere of 2n by n faces inscribed in the ball: no deeper inside it than r·(π/n)²/2 in either direction, which for
+/// n = 300 is 4·10⁻⁵ in all. The shadow's rim is three times that on the light, and at most as long as
+/// the light's own: V is too large by at most 3·4·10⁻⁵·(2/0.9) = 3·10⁻⁴, and by half of that on average.
+#[test]
+fn ball_under_a_sphere() {
+    let n = 300u32;
+    let mut ball = TriangleMesh { name: "ball".into(), ..Default::default() };
+    for row in 0..=n {
+        for column in 0..2 * n {
+            let (polar, turn) = (row as f32 / n as f32 * PI, column as f32 / (2 * n) as f32 * TAU);
+            let at = Vec3::new(polar.sin() * turn.cos(), polar.cos(), polar.sin() * turn.sin());
+            ball.positions.push(BALL.0.as_vec3() + at * BALL.1 as f32);
+        }
+    }
+    for row in 0..n {
+        for column in 0..2 * n {
+            let corner = |r: u32, c: u32| (row + r) * 2 * n + (column + c) % (2 * n);
+            ball.triangles.push([corner(0, 0), corner(1, 0), corner(1, 1)]);
+            ball.triangles.push([corner(0, 0), corner(1, 1), corner(0, 1)]);
+        }
+    }
+    let light = Light::Sphere { center: Vec3::Y * 3.0, radius: 0.9 };
+    let radius = f64::from(0.9f32);
+    assert_traced(&scene(&ball), &light, &floor(3000, 1.3), |x| ball_truth(x, DVec3::Y * 3.0, radius));
+}
+
+#[test]
+fn half_plane_under_the_sun() {
+    let (direction, angular_radius) = (Vec3::new(-0.2, -1.0, 0.3), 5f32.to_radians());
+    let light = Light::Directional { direction, angular_radius };
+    let (sun, radius) = (-direction.as_dvec3().normalize(), f64::from(angular_radius));
+    assert_traced(&scene(&half_plane()), &light, &floor(3000, 0.5), |x| {
+        let side = DVec3::new(1.0, x.x, 0.0);
+        formulas::common_caps(radius, std::f64::consts::FRAC_PI_2, sun.angle_between(side))
+            / formulas::cap(radius)
+    });
+}

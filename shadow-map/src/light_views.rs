@@ -1,0 +1,357 @@
+//! Where the light looks: the projections whose maps together hold every caster that can throw a shadow.
+//!
+//! A map is fitted to the casters, not to the scene: a receiver outside of it has no caster before it and is
+//! lit. Casters behind which there is nothing (the ground under everything) are left out of the fit, which is
+//! what makes a small object on a large ground get all the texels.
+
+use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
+use scene_core::geometry::{Aabb, Object};
+use scene_core::light::LightPoint;
+use scene_core::{Light, Scene};
+
+/// Tangent of the half angle up to which one perspective view serves. Beyond 60° the middle of the map gets
+/// less than a quarter of the texels a radian that its rim gets, and cube faces are the better use of memory.
+const MAX_TAN: f32 = 1.732;
+
+/// How far beyond the casters a view reaches, as a fraction of its extent: rounding must not push a caster's
+/// outermost vertex over the border (2⁻¹⁶ is 256 ulps of the largest coordinate).
+const MARGIN: f32 = 1.0 / 65_536.0;
+
+/// The nearest distance a perspective view sees, as a fraction of its farthest caster's. Reversed floating
+/// point depth keeps its relative precision at any distance, so this may be as small as positions themselves
+/// are exact (2⁻²⁰).
+const NEAR_FRACTION: f32 = 1.0 / 1_048_576.0;
+
+/// A projection of the light's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightView {
+    /// World to the light's clip space; x and y of the map lie in [−w, w], depth is reversed.
+    pub projection_from_world: Mat4,
+    /// Map back to world, for the point a texel's centre and depth stand for.
+    unproject: Unprojection,
+}
+
+/// From normalised device coordinates back to world space, without inverting a matrix.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Unprojection {
+    /// `origin + x·ndc.x + y·ndc.y + z·depth`.
+    Parallel { origin: Vec3, x: Vec3, y: Vec3, z: Vec3 },
+    /// `eye + (forward + x·ndc.x + y·ndc.y)·near/depth`.
+    Central { eye: Vec3, forward: Vec3, x: Vec3, y: Vec3, near: f32 },
+}
+
+impl LightView {
+    /// Parallel light along the unit vector `travel`: covers the box `bounds` given in the axes of `axes`
+    /// (columns x, y, −travel; world space).
+    fn parallel(axes: Mat3, bounds: Aabb) -> Self {
+        let center = bounds.center();
+        let half = (bounds.size() * (0.5 + MARGIN)).max(Vec3::splat(smallest_extent(bounds)));
+        // Depth is reversed: 1 at the side of the light (largest z), 0 at the far side.
+        let scale = Vec3::new(1.0 / half.x, 1.0 / half.y, 0.5 / half.z);
+        let shift = Vec3::new(-center.x * scale.x, -center.y * scale.y, 0.5 - center.z * scale.z);
+        let rows = axes.transpose();
+        let column = |v: Vec3| (v * scale).extend(0.0);
+        let projection_from_world =
+            Mat4::from_cols(column(rows.x_axis), column(rows.y_axis), column(rows.z_axis), shift.extend(1.0));
+        let unproject = Unprojection::Parallel {
+            origin: axes * Vec3::new(center.x, center.y, center.z - half.z),
+            x: axes.x_axis * half.x,
+            y: axes.y_axis * half.y,
+            z: axes.z_axis * (2.0 * half.z),
+        };
+        Self { projection_from_world, unproject }
+    }
+
+    /// Light from `eye`: covers the rectangle `min … max` of tangents in the axes of `axes` (columns x, y and
+    /// backwards; world space), from the distance `near` to infinity.
+    fn central(eye: Vec3, axes: Mat3, min: Vec2, max: Vec2, near: f32) -> Self {
+        let center = (min + max) * 0.5;
+        let half = ((max - min) * (0.5 + MARGIN)).max(Vec2::splat(MARGIN));
+        let view_from_world = axes.transpose();
+        let translation = -(view_from_world * eye);
+        let view_from_world = Mat4::from_cols(
+            view_from_world.x_axis.extend(0.0),
+            view_from_world.y_axis.extend(0.0),
+            view_from_world.z_axis.extend(0.0),
+            translation.extend(1.0),
+        );
+        let projection_from_view = Mat4::from_cols(
+            Vec4::new(1.0 / half.x, 0.0, 0.0, 0.0),
+            Vec4::new(0.0, 1.0 / half.y, 0.0, 0.0),
+            Vec4::new(center.x / half.x, center.y / half.y, 0.0, -1.0),
+            Vec4::new(0.0, 0.0, near, 0.0),
+        );
+        let unproject = Unprojection::Central {
+            eye,
+            forward: axes.x_axis * center.x + axes.y_axis * center.y - axes.z_axis,
+            x: axes.x_axis * half.x,
+            y: axes.y_axis * half.y,
+            near,
+        };
+        Self { projection_from_world: projection_from_view * view_from_world, unproject }
+    }
+
+    /// Normalised device coordinates of a world-space point; `None` outside the map or behind the light.
+    #[inline]
+    pub fn project(&self, point: Vec3) -> Option<Vec2> {
+        let clip = self.projection_from_world * point.extend(1.0);
+        let inside = clip.w > 0.0 && clip.x.abs() <= clip.w && clip.y.abs() <= clip.w;
+        inside.then(|| Vec2::new(clip.x, clip.y) / clip.w)
+    }
+
+    /// Half the longer diagonal of the map in world units at reversed depth `depth`: what one unit of NDC along
+    /// both axes is at most. Times 2/`map_size` it is the diagonal of a texel.
+    #[inline]
+    pub fn half_diagonal(&self, depth: f32) -> f32 {
+        match self.unproject {
+            Unprojection::Parallel { x, y, .. } => (x.length_squared() + y.length_squared()).sqrt(),
+            Unprojection::Central { x, y, near, .. } => {
+                (x.length_squared() + y.length_squared()).sqrt() * (near / depth)
+            }
+        }
+    }
+
+    /// The world-space point at normalised device coordinates `ndc` and reversed depth `depth > 0`.
+    #[inline]
+    pub fn unproject(&self, ndc: Vec2, depth: f32) -> Vec3 {
+        match self.unproject {
+            Unprojection::Parallel { origin, x, y, z } => origin + x * ndc.x + y * ndc.y + z * depth,
+            Unprojection::Central { eye, forward, x, y, near } => {
+                eye + (forward + x * ndc.x + y * ndc.y) * (near / depth)
+            }
+        }
+    }
+}
+
+/// The views of a light.
+#[derive(Clone, Debug, Default)]
+pub struct LightViews {
+    /// The views; a point lies in at most one but for the shared borders of cube faces.
+    pub views: Vec<LightView>,
+    /// Cube faces left out because they see no caster.
+    pub skipped_faces: u64,
+}
+
+/// Chooses the views of `light`: one parallel view for a directional light, one perspective view where the
+/// casters fit into 60° around an axis, else the faces of a cube. No casters give no views.
+pub fn light_views(scene: &Scene, light: &Light, casters: &[&Object], skip: bool) -> LightViews {
+    let mut result = LightViews::default();
+    let bounds = casters.iter().fold(Aabb::EMPTY, |bounds, object| bounds.union(object.bounds));
+    if bounds.is_empty() {
+        return result;
+    }
+    let points = || casters.iter().flat_map(|object| &scene.positions()[object.vertices.clone()]);
+    match light.center() {
+        LightPoint::Towards(to_light) => {
+            let (x, y) = to_light.any_orthonormal_pair();
+            let axes = Mat3::from_cols(x, y, to_light);
+            let light_from_world = axes.transpose();
+            let bounds = Aabb::from_points(points().map(|&p| light_from_world * p));
+            result.views.push(LightView::parallel(axes, bounds));
+        }
+        LightPoint::At(eye) => {
+            let reach = bounds.corners().map(|c| c.distance(eye)).into_iter().fold(0.0, f32::max);
+            let near = (reach * NEAR_FRACTION).max(f32::MIN_POSITIVE);
+            let (axis, max_tan) = match *light {
+                Light::Spot { direction, outer, .. } => (direction, outer.tan()),
+                _ => (bounds.center() - eye, MAX_TAN),
+            };
+            let backwards = (-axis).normalize_or(Vec3::Y);
+            let (x, y) = backwards.any_orthonormal_pair();
+            let axes = Mat3::from_cols(x, y, backwards);
+            let tangents = tangent_bounds(eye, axes, points());
+            let cone = matches!(light, Light::Spot { .. }) && (0.0..=MAX_TAN).contains(&max_tan);
+            match tangents {
+                Some((min, max)) if cone || min.abs().max(max.abs()).max_element() <= MAX_TAN => {
+                    // A spot's cone ends where its light does.
+                    let limit = if cone { Vec2::splat(max_tan) } else { Vec2::INFINITY };
+                    let (min, max) = (min.max(-limit), max.min(limit));
+                    if min.cmple(max).all() {
+                        result.views.push(LightView::central(eye, axes, min, max, near));
+                    }
+                }
+                None if cone => {
+                    let limit = Vec2::splat(max_tan);
+                    result.views.push(LightView::central(eye, axes, -limit, limit, near));
+                }
+                _ => {
+                    for axes in cube_faces() {
+                        if skip && !face_sees(eye, axes, casters) {
+                            result.skipped_faces += 1;
+                        } else {
+                            result.views.push(LightView::central(eye, axes, Vec2::NEG_ONE, Vec2::ONE, near));
+                        }
+                    }
+                }
+            }
+        }
+    }
+    result
+}
+
+/// The rectangle of tangents around `points` as seen from `eye`; `None` if one of them is not in front.
+fn tangent_bounds<'a>(eye: Vec3, axes: Mat3, points: impl Iterator<Item = &'a Vec3>) -> Option<(Vec2, Vec2)> {
+    let view_from_world = axes.transpose();
+    let (mut min, mut max) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
+    for &point in points {
+        let view = view_from_world * (point - eye);
+        let distance = -view.z;
+        // Beyond this tangent the view is too wide whatever the rest.
+        if distance * 1e3 <= view.truncate().abs().max_element() || distance <= 0.0 {
+            return None;
+        }
+        let tangent = view.truncate() / distance;
+        min = min.min(tangent);
+        max = max.max(tangent);
+    }
+    Some((min, max))
+}
+
+/// Axes (right, up, backwards) of the six faces of a cube.
+fn cube_faces() -> [Mat3; 6] {
+    [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z].map(|backwards| {
+        let (x, y) = backwards.any_orthonormal_pair();
+        Mat3::from_cols(x, y, backwards)
+    })
+}
+
+/// Whether the bounds of some object reach into the pyramid of a cube face: they do not if all corners lie
+/// outside one of its four side planes or behind the light.
+fn face_sees(eye: Vec3, axes: Mat3, casters: &[&Object]) -> bool {
+    let view_from_world = axes.transpose();
+    casters.iter().any(|object| {
+        let corners = object.bounds.corners().map(|c| view_from_world * (c - eye));
+        // −z is the distance along the face's axis; a side plane is |x| = −z or |y| = −z.
+        let outside = |side: fn(Vec3) -> f32| corners.iter().all(|&c| side(c) > -c.z * (1.0 + MARGIN));
+        !(object.bounds.is_empty()
+            || corners.iter().all(|c| c.z >= 0.0)
+            || outside(|c| c.x)
+            || outside(|c| -c.x)
+            || outside(|c| c.y)
+            || outside(|c| -c.y))
+    })
+}
+
+/// A floor for a view's extent, so that a flat or pointlike caster still makes a map: ulps of its place.
+fn smallest_extent(bounds: Aabb) -> f32 {
+    (bounds.magnitude() * MARGIN).max(f32::MIN_POSITIVE * 1e6)
+}
+
+/// The casters of a scene, told apart by whether anything lies behind them.
+#[derive(Clone, Debug, Default)]
+pub struct Casters<'a> {
+    /// Those that the maps must hold.
+    pub drawn: Vec<&'a Object>,
+    /// Flat ones with the whole scene on the light's side: they shadow no surface, only free points beyond.
+    pub backdrops: Vec<&'a Object>,
+}
+
+/// Tells casters from backdrops: an object whose triangles all lie in one plane, with the whole scene on the
+/// light's side of it, shadows no surface (but its own back, which is dark by its normal). `tolerance` is the
+/// distance below which a point does not count as behind a plane; the comparison of
+/// [`crate::receiver_plane`] uses the same, so that leaving such a caster out changes no pixel.
+pub fn relevant_casters<'a>(scene: &'a Scene, light: &Light, tolerance: f32) -> Casters<'a> {
+    let casters = scene.objects().iter().filter(|o| o.flags.casts && !o.triangles.is_empty());
+    let (backdrops, drawn) = casters.partition(|object| nothing_behind(scene, light, object, tolerance));
+    Casters { drawn, backdrops }
+}
+
+fn nothing_behind(scene: &Scene, light: &Light, object: &Object, tolerance: f32) -> bool {
+    // A mask's holes would have to be looked up for free points; maps do that already.
+    if object.alpha.is_some() {
+        return false;
+    }
+    let normal_of = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a).try_normalize();
+    let Some((anchor, normal)) =
+        object.triangles.clone().find_map(|t| normal_of(scene.corners(t)).map(|n| (scene.corners(t)[0], n)))
+    else {
+        return false;
+    };
+    let towards_light = match light.center() {
+        LightPoint::At(place) => normal.dot(place - anchor),
+        LightPoint::Towards(direction) => normal.dot(direction) * f32::MAX.sqrt(),
+    };
+    if towards_light.abs() <= tolerance {
+        return false;
+    }
+    let normal = normal * towards_light.signum();
+    let height = |p: Vec3| normal.dot(p - anchor);
+    // Half the tolerance each: a point less than the other half behind this plane is less than the whole
+    // behind any triangle's own.
+    scene.positions()[object.vertices.clone()].iter().all(|&p| height(p).abs() <= 0.5 * tolerance)
+        && scene.objects().iter().filter(|o| o.flags.receives).all(|o| {
+            o.bounds.is_empty() || o.bounds.corners().into_iter().all(|c| height(c) >= -0.5 * tolerance)
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Affine3A;
+    use scene_core::TriangleMesh;
+    use scene_core::geometry::ObjectFlags;
+
+    fn quad_at(y: f32, half: f32) -> TriangleMesh {
+        let corner = |x: f32, z: f32| Vec3::new(x * half, y, z * half);
+        let positions = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+        TriangleMesh::new("quad", positions, vec![[0, 1, 2], [0, 2, 3]])
+    }
+
+    fn scene_of(meshes: &[TriangleMesh]) -> Scene {
+        let mut scene = Scene::new();
+        for mesh in meshes {
+            scene.add(mesh, Affine3A::IDENTITY, ObjectFlags::default()).unwrap();
+        }
+        scene
+    }
+
+    const LIGHTS: [Light; 3] = [
+        Light::Point { position: Vec3::new(0.5, 9.0, 0.2) },
+        Light::Directional { direction: Vec3::new(0.3, -1.0, 0.1), angular_radius: 0.0 },
+        Light::Point { position: Vec3::new(0.0, 0.5, 0.0) },
+    ];
+
+    #[test]
+    fn every_caster_vertex_projects_and_comes_back() {
+        let scene = scene_of(&[quad_at(1.0, 2.0), quad_at(0.3, 1.0)]);
+        for light in LIGHTS {
+            let casters: Vec<_> = scene.objects().iter().collect();
+            let views = light_views(&scene, &light, &casters, true).views;
+            for &p in scene.positions() {
+                let (view, ndc) =
+                    views.iter().find_map(|v| v.project(p).map(|ndc| (v, ndc))).expect("outside every view");
+                let clip = view.projection_from_world * p.extend(1.0);
+                let back = view.unproject(ndc, clip.z / clip.w);
+                assert!(back.distance(p) < 1e-5, "{light:?}: {p} came back as {back}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_ground_under_everything_is_no_caster() {
+        let scene = scene_of(&[quad_at(0.0, 50.0), quad_at(1.0, 1.0)]);
+        for light in &LIGHTS[..2] {
+            let casters = relevant_casters(&scene, light, 1e-5);
+            assert_eq!((casters.drawn.len(), casters.backdrops.len()), (1, 1));
+        }
+        // From below, the ground hides everything.
+        let below = Light::Point { position: Vec3::new(0.0, -3.0, 0.0) };
+        let casters = relevant_casters(&scene, &below, 1e-5).drawn;
+        assert_eq!((casters.len(), casters[0].bounds.max.y), (1, 0.0));
+    }
+
+    #[test]
+    fn a_light_among_casters_gets_faces_and_skips_empty_ones() {
+        let scene = scene_of(&[quad_at(0.0, 3.0)]);
+        let casters: Vec<_> = scene.objects().iter().collect();
+        let light = Light::Point { position: Vec3::new(0.0, 1.0, 0.0) };
+        let views = light_views(&scene, &light, &casters, true);
+        assert_eq!((views.views.len(), views.skipped_faces), (5, 1));
+        assert_eq!(light_views(&scene, &light, &casters, false).views.len(), 6);
+    }
+
+    #[test]
+    fn no_casters_no_views() {
+        assert!(light_views(&Scene::new(), &LIGHTS[0], &[], true).views.is_empty());
+    }
+}

@@ -1,0 +1,107 @@
+//! The comparison: does the surface stored in a texel shadow the receiver? No bias that anyone must tune.
+//!
+//! A texel stands for an area, so comparing its one depth with a receiver elsewhere in that area is wrong
+//! by as much as surfaces slope: the acne that biases hide. Two questions need no bias, because each is asked
+//! at one point where both surfaces are known:
+//!
+//! 1. *Does the stored point lie above the receiver's plane?* The point `q` at the texel's centre is exact. If
+//!    it is on or below the tangent plane of the receiver, nothing in this texel rises above the receiver's
+//!    surface: a plane never shadows itself, at any slope, nor does a convex surface.
+//! 2. *Does the receiver lie behind the stored triangle's plane?* A triangle shadows only what is behind its
+//!    plane as seen from the light. A lit wall beside the receiver is not behind itself: concave corners.
+//!
+//! The receiver is in shadow if both hold. The second never rejects a true shadow; the first can, within one
+//! texel of the receiver: that is the contact gap, at most the texel's footprint on the receiver.
+//!
+//! # Tolerance
+//! Both questions are signed distances to a plane, and differ from the true ones by rounding only: positions
+//! from the G-buffer, the map's depth and the dot product each carry a few units in the last place of the
+//! largest coordinate in play. See [`plane_tolerance`]. The first adds what the rasteriser's snapping moves a
+//! stored point across the light's ray, 2⁻⁹ texel ([`scene_core::raster::DEPTH_POSITION_ERROR`]).
+
+use glam::Vec3;
+use scene_core::Light;
+use scene_core::geometry::Aabb;
+use scene_core::light::LightPoint;
+
+/// Distance from a plane, in scene units, below which a point counts as on it, for receivers anywhere within
+/// `bounds`. Add [`view_tolerance`] for a receiver that a camera found.
+///
+/// With u = 2⁻²⁴ and m the largest absolute coordinate of scene and light: a map's point is projected,
+/// interpolated and unprojected, off by ≤ 12·u·m along the light's ray; subtracting the anchor and the dot
+/// product of three terms with a unit normal that is itself rounded add ≤ 4√3·u·2m. Together below
+/// 32·u·m = 2⁻¹⁹·m.
+pub fn plane_tolerance(bounds: Aabb, light: &Light) -> f32 {
+    let place = match light.center() {
+        LightPoint::At(place) => place.abs().max_element(),
+        LightPoint::Towards(_) => 0.0,
+    };
+    bounds.magnitude().max(place) * (1.0 / 524_288.0)
+}
+
+/// What a G-buffer position adds to [`plane_tolerance`]: it is `eye + t·d` for a ray of length ≤ 2·`depth`
+/// (up to 120° across the picture), off by ≤ 6·u times the larger of the eye's coordinates and that length.
+/// The eye's coordinates are within the receiver's plus the length, hence 6·u·4·`depth` < 2⁻¹⁹·`depth`; the
+/// receiver's own share is in [`plane_tolerance`].
+#[inline]
+pub fn view_tolerance(depth: f32) -> f32 {
+    depth * (1.0 / 524_288.0)
+}
+
+/// Question 1: whether the stored point `stored` lies above the receiver's tangent plane by more than
+/// `tolerance`. `normal` is the receiver's unit normal on the side that the light shines on.
+#[inline]
+pub fn rises_above(stored: Vec3, receiver: Vec3, normal: Vec3, tolerance: f32) -> bool {
+    normal.dot(stored - receiver) > tolerance
+}
+
+/// Question 2: whether `receiver` lies behind the plane of the triangle `corners`, seen from the light, by
+/// more than `tolerance`. A degenerate triangle has no plane and hides nothing; a triangle seen edge-on hides
+/// nothing either.
+#[inline]
+pub fn is_behind(corners: [Vec3; 3], receiver: Vec3, light: LightPoint, tolerance: f32) -> bool {
+    let [a, b, c] = corners;
+    let normal = (b - a).cross(c - a);
+    let length = normal.length();
+    let (to_light, _) = light.ray_from(a);
+    let side = normal.dot(to_light);
+    let height = normal.dot(receiver - a);
+    // height / length is the signed distance; its sign is turned to the light's side.
+    length > 0.0
+        && if side > 0.0 { -height > tolerance * length } else { side < 0.0 && height > tolerance * length }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CORNERS: [Vec3; 3] = [Vec3::ZERO, Vec3::X, Vec3::Z];
+
+    #[test]
+    fn behind_is_told_from_the_lights_side() {
+        let above = LightPoint::At(Vec3::new(0.2, 5.0, 0.2));
+        let below = LightPoint::Towards(Vec3::NEG_Y);
+        let under = Vec3::new(0.2, -0.1, 0.2);
+        assert!(is_behind(CORNERS, under, above, 1e-6));
+        assert!(!is_behind(CORNERS, under, below, 1e-6));
+        assert!(is_behind(CORNERS, -under, below, 1e-6));
+        // On the plane, or edge-on: not behind.
+        assert!(!is_behind(CORNERS, Vec3::new(9.0, 0.0, 9.0), above, 1e-6));
+        assert!(!is_behind(CORNERS, under, LightPoint::Towards(Vec3::X), 1e-6));
+    }
+
+    #[test]
+    fn degenerate_triangles_hide_nothing() {
+        let light = LightPoint::At(Vec3::Y);
+        assert!(!is_behind([Vec3::ZERO; 3], Vec3::NEG_Y, light, 1e-6));
+        assert!(!is_behind([Vec3::ZERO, Vec3::X, Vec3::X * 2.0], Vec3::NEG_Y, light, 1e-6));
+    }
+
+    #[test]
+    fn a_plane_does_not_rise_above_itself() {
+        let normal = Vec3::new(0.6, 0.8, 0.0);
+        let along = Vec3::new(0.8, -0.6, 0.0) * 7.0;
+        assert!(!rises_above(along, Vec3::ZERO, normal, 1e-5));
+        assert!(rises_above(along + normal * 1e-3, Vec3::ZERO, normal, 1e-5));
+    }
+}

@@ -1,0 +1,100 @@
+//! The trait's implementation, nothing else.
+
+use glam::Vec3;
+use scene_core::technique::{
+    Capability, Description, Params, PreparedShadow, Setting, SettingsError, ShadowQuery, ShadowTechnique,
+    Support, TechniqueError, TechniqueFactory,
+};
+use scene_core::{GBuffer, Report, VisibilityImage};
+
+use crate::{PreparedShadowMap, ShadowMap, ShadowMapParams};
+
+impl ShadowTechnique for ShadowMap {
+    fn name(&self) -> &'static str {
+        ShadowMapParams::TECHNIQUE
+    }
+
+    fn describe(&self) -> Description {
+        const CENTRE: Support = Support::Approximate("an extended light is taken for its centre");
+        let support = |capability| match capability {
+            Capability::DirectionalLight | Capability::PointLight | Capability::SpotLight => Support::Exact,
+            Capability::Sun | Capability::SphereLight | Capability::RectLight | Capability::DiskLight => {
+                CENTRE
+            }
+            Capability::AlphaMask | Capability::TriangleSoup | Capability::FreePoints => Support::Exact,
+            Capability::Gpu => Support::Unsupported("the CPU path is the only one so far"),
+        };
+        Description {
+            summary: SUMMARY,
+            support: Capability::ALL
+                .into_iter()
+                .map(|capability| (capability, support(capability)))
+                .collect(),
+        }
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        self.params.to_json()
+    }
+
+    fn prepare<'a>(
+        &self,
+        query: &ShadowQuery<'a>,
+    ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError> {
+        let (prepared, report) = ShadowMap::prepare(self, query.scene, query.light);
+        Ok((Box::new(prepared), report))
+    }
+}
+
+impl PreparedShadow for PreparedShadowMap<'_> {
+    fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError> {
+        if visibility.values.len() != gbuffer.pixel_count() {
+            let (expected, got) = (gbuffer.pixel_count(), visibility.values.len());
+            return Err(TechniqueError::OutputSize { expected, got });
+        }
+        Ok(PreparedShadowMap::shade(self, gbuffer, visibility))
+    }
+
+    fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Result<Report, TechniqueError> {
+        if points.len() != visibility.len() {
+            return Err(TechniqueError::OutputSize { expected: points.len(), got: visibility.len() });
+        }
+        Ok(PreparedShadowMap::visibility_at(self, points, visibility))
+    }
+
+    fn survives_camera(&self) -> bool {
+        true
+    }
+}
+
+const SUMMARY: &str = "depth images from the light; hard shadows at the cost of one extra drawing";
+
+/// Makes [`ShadowMap`]s from settings given as text.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Factory;
+
+impl TechniqueFactory for Factory {
+    fn name(&self) -> &'static str {
+        ShadowMapParams::TECHNIQUE
+    }
+
+    fn summary(&self) -> &'static str {
+        SUMMARY
+    }
+
+    fn settings(&self) -> &'static [Setting] {
+        ShadowMapParams::SETTINGS
+    }
+
+    fn presets(&self) -> Vec<&'static str> {
+        ShadowMapParams::PRESETS.iter().map(|preset| preset.name).collect()
+    }
+
+    fn create(
+        &self,
+        preset: Option<&str>,
+        overrides: &[(String, String)],
+    ) -> Result<Box<dyn ShadowTechnique>, SettingsError> {
+        Ok(Box::new(ShadowMap::new(ShadowMapParams::from_overrides(preset, overrides)?)))
+    }
+}
