@@ -13,6 +13,9 @@
 //! include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 //! ```
 //!
+//! Kernels for unit tests of shader functions lie in `tests/shaders/*.wesl`, may import `package::…` too, and have
+//! a table of their own, `test_shaders.rs`.
+//!
 //! The table holds one constant per module with an entry point (`gbuffer_pass.wesl` → `GBUFFER_PASS`), and
 //! `ALL`, name and WGSL of every module, those without entry points too, so that a test reaches each.
 //!
@@ -38,7 +41,7 @@ use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 pub use error::{LinkError, Place};
-pub use link::{Declaration, LinkedShader, link_file, link_folder, link_source};
+pub use link::{Declaration, LinkedShader, link_file, modules};
 
 /// The value of `links` in scene-core's manifest.
 const SCENE_CORE_LINKS: &str = "gnomon_scene_core";
@@ -46,7 +49,8 @@ const SCENE_CORE_LINKS: &str = "gnomon_scene_core";
 /// The variable that Cargo makes of scene-core's `shaders` metadata.
 const SHARED_VARIABLE: &str = "DEP_GNOMON_SCENE_CORE_SHADERS";
 
-/// Links the calling crate's `shaders/*.wesl` and writes `shaders.rs` and the WGSL files to `OUT_DIR`. For
+/// Links the calling crate's `shaders/*.wesl` and `tests/shaders/*.wesl`, and writes `shaders.rs`,
+/// `test_shaders.rs` and the WGSL files to `OUT_DIR`. For
 /// build scripts only: a failure is told to Cargo as an error with file and line, and ends the build.
 pub fn build() {
     if let Err(error) = try_build() {
@@ -58,7 +62,8 @@ pub fn build() {
 
 fn try_build() -> Result<(), LinkError> {
     let variable = |name: &'static str| env::var_os(name).ok_or(LinkError::NotABuildScript { name });
-    let own = PathBuf::from(variable("CARGO_MANIFEST_DIR")?).join("shaders");
+    let manifest = PathBuf::from(variable("CARGO_MANIFEST_DIR")?);
+    let own = manifest.join("shaders");
     let out = PathBuf::from(variable("OUT_DIR")?);
     println!("cargo::rerun-if-changed={}", own.display());
     let shared = if env::var("CARGO_MANIFEST_LINKS").is_ok_and(|links| links == SCENE_CORE_LINKS) {
@@ -69,11 +74,34 @@ fn try_build() -> Result<(), LinkError> {
         println!("cargo::rerun-if-changed={}", shared.display());
         shared
     };
-    let shaders = link_folder(&own, &shared)?;
-    for shader in &shaders {
-        write(&out.join(format!("{}.wgsl", shader.name)), &shader.wgsl)?;
+    write_table("shaders", &own, &own, &shared, &out)?;
+    // Packages may leave their tests out.
+    let tests = manifest.join("tests").join("shaders");
+    if tests.is_dir() {
+        println!("cargo::rerun-if-changed={}", tests.display());
+        write_table("test_shaders", &tests, &own, &shared, &out)?;
     }
-    write(&out.join("shaders.rs"), &table(&shaders))
+    Ok(())
+}
+
+/// Links the modules of `folder`, and writes them and their table, `{name}.rs`, to `out`.
+fn write_table(
+    name: &'static str,
+    folder: &Path,
+    own: &Path,
+    shared: &Path,
+    out: &Path,
+) -> Result<(), LinkError> {
+    let linked_folder = out.join(name);
+    fs::create_dir_all(&linked_folder)
+        .map_err(|source| LinkError::File { path: linked_folder.clone(), source })?;
+    let mut shaders = Vec::new();
+    for file in modules(folder)? {
+        let shader = link_file(&file, own, shared)?;
+        write(&linked_folder.join(format!("{}.wgsl", shader.name)), &shader.wgsl)?;
+        shaders.push(shader);
+    }
+    write(&out.join(format!("{name}.rs")), &table(name, &shaders))
 }
 
 fn write(path: &Path, text: &str) -> Result<(), LinkError> {
@@ -81,17 +109,16 @@ fn write(path: &Path, text: &str) -> Result<(), LinkError> {
 }
 
 /// The Rust source of a crate's shader table.
-fn table(shaders: &[LinkedShader]) -> String {
+fn table(folder: &str, shaders: &[LinkedShader]) -> String {
     let mut text = String::new();
     let mut all = String::new();
     for shader in shaders {
         let name = &shader.name;
-        let source = format!("include_str!(concat!(env!(\"OUT_DIR\"), \"/{name}.wgsl\"))");
+        let source = format!("include_str!(concat!(env!(\"OUT_DIR\"), \"/{folder}/{name}.wgsl\"))");
         if shader.has_entry_point {
             let constant = name.to_uppercase();
             // Writing to a String cannot fail.
-            let _ =
-                writeln!(text, "/// `shaders/{name}.wesl`, linked.\npub const {constant}: &str = {source};");
+            let _ = writeln!(text, "/// `{name}.wesl`, linked.\npub const {constant}: &str = {source};");
             let _ = writeln!(all, "    (\"{name}\", {constant}),");
         } else {
             let _ = writeln!(all, "    (\"{name}\", {source}),");
@@ -99,7 +126,7 @@ fn table(shaders: &[LinkedShader]) -> String {
     }
     let _ = writeln!(
         text,
-        "/// Name and linked WGSL of every module in `shaders`.\npub const ALL: &[(&str, &str)] = &[\n{all}];"
+        "/// Name and linked WGSL of every module.\npub const ALL: &[(&str, &str)] = &[\n{all}];"
     );
     text
 }
@@ -115,7 +142,7 @@ mod tests {
             has_entry_point,
             ..LinkedShader::default()
         };
-        let text = table(&[shader("camera", false), shader("gbuffer_pass", true)]);
+        let text = table("shaders", &[shader("camera", false), shader("gbuffer_pass", true)]);
         assert!(text.contains("pub const GBUFFER_PASS: &str"), "{text}");
         assert!(!text.contains("pub const CAMERA"), "{text}");
         assert!(

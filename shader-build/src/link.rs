@@ -19,7 +19,7 @@ const SHARED_PACKAGE: &str = "scene_core";
 pub struct LinkedShader {
     /// The module's name: its file's without ending.
     pub name: String,
-    /// Its file; empty for one given as text.
+    /// Its file.
     pub path: PathBuf,
     /// Plain WGSL.
     pub wgsl: String,
@@ -43,15 +43,14 @@ pub struct Declaration {
     pub file: PathBuf,
 }
 
-/// Links every `*.wesl` of the folder `own`, in the order of their names. `shared` is the folder of
-/// scene-core's modules; the two may be the same.
+/// The WESL modules in `folder`, in the order of their names.
 ///
 /// # Errors
-/// The first broken module, with file and line; a folder without modules.
-pub fn link_folder(own: &Path, shared: &Path) -> Result<Vec<LinkedShader>, LinkError> {
-    let fail = |source| LinkError::File { path: own.to_owned(), source };
+/// A folder that cannot be read, or holds no module.
+pub fn modules(folder: &Path) -> Result<Vec<PathBuf>, LinkError> {
+    let fail = |source| LinkError::File { path: folder.to_owned(), source };
     let mut files = Vec::new();
-    for entry in fs::read_dir(own).map_err(fail)? {
+    for entry in fs::read_dir(folder).map_err(fail)? {
         let path = entry.map_err(fail)?.path();
         if path.extension().is_some_and(|ending| ending == "wesl") {
             files.push(path);
@@ -59,12 +58,13 @@ pub fn link_folder(own: &Path, shared: &Path) -> Result<Vec<LinkedShader>, LinkE
     }
     files.sort();
     if files.is_empty() {
-        return Err(LinkError::Empty { folder: own.to_owned() });
+        return Err(LinkError::Empty { folder: folder.to_owned() });
     }
-    files.iter().map(|path| link_file(path, own, shared)).collect()
+    Ok(files)
 }
 
-/// Links the module in the file `path` of the folder `own`; see [`link_folder`].
+/// Links the module in the file `path`, which may import `scene_core::…` from the folder `shared` and `package::…`
+/// from the folder `own`; the two may be the same.
 ///
 /// # Errors
 /// A broken module, with file and line.
@@ -73,31 +73,17 @@ pub fn link_file(path: &Path, own: &Path, shared: &Path) -> Result<LinkedShader,
     if name.is_empty() || !name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_') {
         return Err(LinkError::Name { path: path.to_owned() });
     }
-    let mut router = router(shared);
-    router.mount_fallback_resolver(FileResolver::new(own));
+    let source =
+        fs::read_to_string(path).map_err(|source| LinkError::File { path: path.to_owned(), source })?;
     let root = ModulePath::new(PathOrigin::Absolute, vec![name.to_owned()]);
+    let mut this = VirtualResolver::new();
+    this.add_module(ModulePath::new_root(), source.into());
+    let mut router = router(shared);
+    router.mount_resolver(root.clone(), this);
+    router.mount_fallback_resolver(FileResolver::new(own));
     let mut shader = link(&root, path, &router)?;
     shader.name = name.to_owned();
     shader.path = path.to_owned();
-    Ok(shader)
-}
-
-/// Links WESL given as text, for tests of shader functions: it may import `scene_core::…` and, where `own` is
-/// given, `package::…` from that folder.
-///
-/// # Errors
-/// As [`link_folder`]; places in the text itself are told of a file named "inline".
-pub fn link_source(source: &str, own: Option<&Path>, shared: &Path) -> Result<LinkedShader, LinkError> {
-    let root = ModulePath::new(PathOrigin::Absolute, vec!["inline".to_owned()]);
-    let mut inline = VirtualResolver::new();
-    inline.add_module(ModulePath::new_root(), source.to_owned().into());
-    let mut router = router(shared);
-    router.mount_resolver(root.clone(), inline);
-    if let Some(own) = own {
-        router.mount_fallback_resolver(FileResolver::new(own));
-    }
-    let mut shader = link(&root, Path::new("inline"), &router)?;
-    shader.name = "inline".to_owned();
     Ok(shader)
 }
 
@@ -182,6 +168,10 @@ mod tests {
         folder
     }
 
+    fn link_folder(own: &Path, shared: &Path) -> Result<Vec<LinkedShader>, LinkError> {
+        modules(own)?.iter().map(|path| link_file(path, own, shared)).collect()
+    }
+
     const SHARED: (&str, &str) =
         ("maths.wesl", "fn twice(x: f32) -> f32 { return 2.0 * x; }\nfn unused() {}\n");
     const ENTRY: &str = "import scene_core::maths::twice;
@@ -210,10 +200,12 @@ mod tests {
     }
 
     #[test]
-    fn text_is_linked_as_files_are() {
-        let shared = folder(&[SHARED]);
-        let shader = link_source(ENTRY, None, shared.path()).unwrap();
+    fn a_module_may_lie_beside_the_package() {
+        let own = folder(&[("maths.wesl", SHARED.1)]);
+        let tests = folder(&[("kernel.wesl", &ENTRY.replace("scene_core", "package"))]);
+        let shader = link_file(&tests.path().join("kernel.wesl"), own.path(), own.path()).unwrap();
         assert!(shader.wgsl.contains("twice"));
+        assert!(shader.declarations.iter().any(|d| d.file == own.path().join("maths.wesl")));
     }
 
     #[test]

@@ -50,21 +50,21 @@ fn check_tree(root: &Path) -> Result<Checked, CheckError> {
         checked.faults.push("no shader was found: is this the workspace?".to_owned());
     }
     let shared = root.join("scene-core").join("shaders");
-    let mut has_table = BTreeMap::new();
+    let mut tables = BTreeMap::new();
     for file in &files {
         let name = file.strip_prefix(root).unwrap_or(file);
         let folder = file.parent().unwrap_or(root);
-        if !*has_table.entry(folder.to_owned()).or_insert_with(|| is_linked(folder))
-            || file.extension().is_some_and(|ending| ending == "wgsl")
-        {
+        let own = tables.entry(folder.to_owned()).or_insert_with(|| own_folder(folder));
+        let Some(own) = own.as_ref().filter(|_| file.extension().is_some_and(|ending| ending == "wesl"))
+        else {
             checked.faults.push(format!(
-                "{}: in no shader table: a crate links what lies in its folder `shaders`, as .wesl, from its \
-                 build script by gnomon_shader_build::build",
+                "{}: in no shader table: a crate links what lies in `shaders` and `tests/shaders`, as .wesl, from \
+                 its build script by gnomon_shader_build::build",
                 name.display()
             ));
             continue;
-        }
-        match link_file(file, folder, &shared) {
+        };
+        match link_file(file, own, &shared) {
             Ok(shader) => check_shader(&shader, &mut checked),
             Err(error) => checked.faults.push(error.to_string()),
         }
@@ -76,13 +76,15 @@ fn check_tree(root: &Path) -> Result<Checked, CheckError> {
     Ok(checked)
 }
 
-/// Whether a build script links the shaders of this folder.
-fn is_linked(folder: &Path) -> bool {
-    let calls = |script: PathBuf| {
-        fs::read_to_string(script).is_ok_and(|text| text.contains("gnomon_shader_build::build()"))
-    };
-    folder.file_name().is_some_and(|name| name == "shaders")
-        && folder.parent().is_some_and(|member| calls(member.join("build.rs")))
+/// The crate's own modules, for shaders of a folder that a build script links.
+fn own_folder(folder: &Path) -> Option<PathBuf> {
+    if folder.file_name()? != "shaders" {
+        return None;
+    }
+    let parent = folder.parent()?;
+    let member = if parent.file_name()? == "tests" { parent.parent()? } else { parent };
+    let script = fs::read_to_string(member.join("build.rs")).ok()?;
+    script.contains("gnomon_shader_build::build()").then(|| member.join("shaders"))
 }
 
 /// Books what is wrong with a linked shader.
@@ -182,6 +184,20 @@ mod tests {
         let faults = check_tree(tree.path()).unwrap().faults;
         assert_eq!(faults.len(), 2, "{faults:?}");
         assert!(faults.iter().all(|f| f.starts_with("scene-core/shaders/maths.wesl:3")), "{faults:?}");
+    }
+
+    #[test]
+    fn kernels_of_tests_are_checked_too() {
+        let kernel = "import package::a::half;\n@compute @workgroup_size(1) fn main() { _ = half(1u); }\n";
+        let half = ("scene-core/shaders/a.wesl", "fn half(x: f32) -> f32 { return 0.5 * x; }\n");
+        let faults =
+            check_tree(tree(&[BUILD, half, ("scene-core/tests/shaders/kernel.wesl", kernel)]).path())
+                .unwrap()
+                .faults;
+        assert!(
+            faults.len() == 1 && faults[0].starts_with("scene-core/tests/shaders/kernel.wesl:2"),
+            "{faults:?}"
+        );
     }
 
     #[test]

@@ -144,6 +144,8 @@ impl DepthUniform {
 mod tests {
     use std::mem::{offset_of, size_of};
 
+    use wgpu::naga;
+
     use super::*;
     use crate::gpu::shaders;
 

@@ -1,7 +1,5 @@
 //! Functions of the shared WESL modules against their Rust twins, in a compute kernel.
 
-use std::path::Path;
-
 use bytemuck::{Pod, Zeroable};
 use glam::{UVec2, Vec2, Vec3, Vec4};
 use gnomon_scene_core::gpu::{CameraUniform, LightUniform, testing};
@@ -9,24 +7,14 @@ use gnomon_scene_core::light::sampling::{LightView, SampleKey, sobol_of_seeds};
 use gnomon_scene_core::light::{Light, LightPoint};
 use gnomon_scene_core::{Camera, geometry};
 
-/// Links a kernel that may import `scene_core::…` and runs it. `body` computes `outputs[i]` from `inputs[i]`.
-fn run<I: Pod, O: Pod>(imports: &str, types: [&str; 2], body: &str, inputs: &[I]) -> Option<Vec<O>> {
+#[allow(dead_code, unreachable_pub, reason = "generated for any test to use")]
+mod kernels {
+    include!(concat!(env!("OUT_DIR"), "/test_shaders.rs"));
+}
+
+fn run<I: Pod, O: Pod>(kernel: &str, inputs: &[I]) -> Option<Vec<O>> {
     let gpu = testing::gpu()?;
-    let [input, output] = types;
-    let source = format!(
-        "{imports}
-@group(0) @binding(0) var<storage, read> inputs: array<{input}>;
-@group(0) @binding(1) var<storage, read_write> outputs: array<{output}>;
-@compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) {{
-    let i = id.x;
-    if i < arrayLength(&inputs) {{
-        {body}
-    }}
-}}"
-    );
-    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
-    let shader = gnomon_shader_build::link_source(&source, None, &shared).unwrap();
-    Some(testing::run_kernel(&gpu, &shader.wgsl, inputs).unwrap())
+    Some(testing::run_kernel(&gpu, kernel, inputs).unwrap())
 }
 
 fn random(count: u32, key: u64) -> Vec<Vec2> {
@@ -44,9 +32,7 @@ fn sobol_is_its_twin_bit_for_bit() {
             [index, (seeds >> 32) as u32, seeds as u32, 0]
         })
         .collect();
-    let body = "outputs[i] = sobol(inputs[i].x, inputs[i].yz);";
-    let imports = "import scene_core::sampling::sobol;";
-    let Some(points) = run::<_, Vec2>(imports, ["vec4u", "vec2f"], body, &inputs) else { return };
+    let Some(points) = run::<_, Vec2>(kernels::SOBOL, &inputs) else { return };
     for (input, point) in inputs.iter().zip(points) {
         assert_eq!(point, sobol_of_seeds(input[0], [input[1], input[2]]), "{input:?}");
     }
@@ -67,9 +53,7 @@ fn the_hash_mixes_every_bit() {
             key
         })
         .collect();
-    let body = "outputs[i] = vec4u(hash(inputs[i].xyz), 0u);";
-    let imports = "import scene_core::sampling::hash;";
-    let Some(hashes) = run::<_, [u32; 4]>(imports, ["vec4u", "vec4u"], body, &keys) else { return };
+    let Some(hashes) = run::<_, [u32; 4]>(kernels::HASH, &keys) else { return };
     for bit in (1..97).filter(|bit| (bit - 1) % 32 < 24) {
         let flips: u32 = hashes
             .chunks(97)
@@ -126,19 +110,13 @@ fn light_inputs() -> Vec<(Light, LightInput)> {
     inputs.collect()
 }
 
-const LIGHT_IMPORTS: &str =
-    "import scene_core::light::{Light, light_center, light_is_above_plane, light_point,
-    light_reaches, to_light};
-struct Input { light: Light, receiver: vec3f, normal: vec3f, square: vec2f }";
-
 /// Twins compute the same formulas in f32, in the same order up to fused operations, from frames rounded once
 /// instead of in f64: a few dozen roundings of 2⁻²⁴ relative to the largest length in play.
 #[test]
 fn light_points_are_their_twins() {
     let inputs = light_inputs();
     let uniforms: Vec<_> = inputs.iter().map(|(_, input)| *input).collect();
-    let body = "outputs[i] = light_point(inputs[i].light, inputs[i].receiver, inputs[i].square);";
-    let Some(points) = run::<_, Vec4>(LIGHT_IMPORTS, ["Input", "vec4f"], body, &uniforms) else { return };
+    let Some(points) = run::<_, Vec4>(kernels::LIGHT_POINTS, &uniforms) else { return };
     for ((light, input), point) in inputs.iter().zip(points) {
         let expected = LightView::new(light, input.receiver).point(input.square);
         let (place, w) = match expected {
@@ -159,12 +137,7 @@ fn light_points_are_their_twins() {
 fn light_queries_are_their_twins() {
     let inputs = light_inputs();
     let uniforms: Vec<_> = inputs.iter().map(|(_, input)| *input).collect();
-    let body = "let input = inputs[i];
-        let ray = to_light(light_center(input.light), input.receiver);
-        let above = light_is_above_plane(input.light, input.receiver, input.normal);
-        let bits = u32(light_reaches(input.light, input.receiver)) | (u32(above) << 1u);
-        outputs[i] = vec4f(ray, f32(bits));";
-    let Some(answers) = run::<_, Vec4>(LIGHT_IMPORTS, ["Input", "vec4f"], body, &uniforms) else { return };
+    let Some(answers) = run::<_, Vec4>(kernels::LIGHT_QUERIES, &uniforms) else { return };
     let (mut reached, mut above) = (0, 0);
     let mut differ = 0;
     for ((light, input), answer) in inputs.iter().zip(answers) {
@@ -197,7 +170,7 @@ fn camera_rays_and_depths_are_their_twins() {
     #[derive(Clone, Copy, Debug, Pod, Zeroable)]
     struct Input {
         camera: CameraUniform,
-        pixel: Vec2,
+        pixel: UVec2,
         view_depth: f32,
         padding: u32,
     }
@@ -210,20 +183,14 @@ fn camera_rays_and_depths_are_their_twins() {
             .zip(random(256, 6))
             .map(|(p, d)| Input {
                 camera: uniform,
-                pixel: (p * size).floor() + 0.5,
+                pixel: (p * size).as_uvec2(),
                 view_depth: 0.1 + d.x * 400.0,
                 padding: 0,
             })
             .collect();
-        let imports = "import scene_core::camera::{Camera, position_from_view_depth, view_depth_from_depth};
-struct Input { camera: Camera, pixel: vec2f, view_depth: f32 }";
-        let body = "let input = inputs[i];
-        let position = position_from_view_depth(input.camera, input.pixel, input.view_depth);
-        let depth = input.camera.depth_scale.x + input.camera.depth_scale.y / input.view_depth;
-        outputs[i] = vec4f(position, view_depth_from_depth(input.camera, depth));";
-        let Some(answers) = run::<_, Vec4>(imports, ["Input", "vec4f"], body, &inputs) else { return };
+        let Some(answers) = run::<_, Vec4>(kernels::CAMERA, &inputs) else { return };
         for (input, answer) in inputs.iter().zip(answers) {
-            let expected = camera.eye + camera.ray_direction(input.pixel) * input.view_depth;
+            let expected = camera.eye + camera.ray_direction(input.pixel.as_vec2() + 0.5) * input.view_depth;
             let ulps = f32::EPSILON * (camera.eye.length() + 2.0 * input.view_depth);
             assert!((answer.truncate() - expected).length() <= 4.0 * ulps, "{answer} {expected}");
             // Depth is rounded relative to its largest term, which at far distances is the constant one.
@@ -254,23 +221,13 @@ fn cut_outs_are_their_twins() {
         Vec2::ONE,
         Vec2::new(-1e-30, 0.5),
     ]);
-    let source = "import scene_core::cutout::{is_solid, uvs};
-@group(0) @binding(0) var<storage, read_write> outputs: array<u32>;
-@compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) {
-    if id.x < arrayLength(&uvs) {
-        let bits = vec3u(u32(is_solid(0u, uvs[id.x])), u32(is_solid(1u, uvs[id.x])), u32(is_solid(2u, uvs[id.x])));
-        outputs[id.x] = bits.x | (bits.y << 1u) | (bits.z << 2u) | (u32(is_solid(3u, uvs[id.x])) << 3u);
-    }
-}";
-    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
-    let shader = gnomon_shader_build::link_source(source, None, &shared).unwrap();
     let words = mask_words(&[Some(&masks[0]), Some(&masks[1]), Some(&masks[2]), None]);
     let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: None,
         layout: None,
         module: &gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: None,
-            source: wgpu::ShaderSource::Wgsl(shader.wgsl.as_str().into()),
+            source: wgpu::ShaderSource::Wgsl(kernels::CUTOUT.into()),
         }),
         entry_point: None,
         compilation_options: Default::default(),
@@ -280,7 +237,7 @@ fn cut_outs_are_their_twins() {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage })
     };
-    let outputs = buffer(bytemuck::cast_slice(&vec![UVec2::ZERO.x; coordinates.len()]));
+    let outputs = buffer(bytemuck::cast_slice(&vec![0u32; coordinates.len()]));
     let groups = [
         vec![&outputs],
         vec![&buffer(bytemuck::cast_slice(&coordinates)), &buffer(bytemuck::cast_slice(&words))],

@@ -1,6 +1,7 @@
 //! Every linked shader of this crate is valid.
 
 use gnomon_scene_core::gpu::shaders;
+use wgpu::naga;
 
 #[test]
 fn every_shader_is_valid() {
