@@ -13,7 +13,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use gnomon_shader_build::{LinkedShader, link_file};
-use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator};
 
 use crate::shell::{CheckError, root};
 use crate::tidy::collect;
@@ -114,7 +114,15 @@ fn validate(shader: &LinkedShader) -> Result<(naga::Module, ModuleInfo), String>
         told(line, error.emit_to_string(&shader.wgsl))
     })?;
     let info = Validator::new(ValidationFlags::all(), CAPABILITIES).validate(&module).map_err(|error| {
-        let line = error.location(&shader.wgsl).map(|location| location.line_number);
+        // Of the places that the error names, the smallest: an expression and not the function around it.
+        let spans = error.spans().map(|(span, _)| *span).filter(naga::Span::is_defined);
+        let smallest = spans.min_by_key(|span| span.to_range().map_or(usize::MAX, |range| range.len()));
+        let line = smallest.map(|span| span.location(&shader.wgsl).line_number);
+        // Faults of entry points have no place, but a name.
+        let line = line.or_else(|| match error.as_inner() {
+            ValidationError::EntryPoint { name, .. } => origin::line_of(shader, name),
+            _ => None,
+        });
         told(line, error.emit_to_string(&shader.wgsl))
     })?;
     Ok((module, info))

@@ -41,7 +41,9 @@ pub(crate) fn environment() -> Result<Vec<(&'static str, String)>, CheckError> {
         Choice::Loader => Ok(Vec::new()),
         Choice::Software(driver) => {
             eprintln!("==> GPU: none; software Vulkan by {}", driver.display());
-            Ok(vec![("VK_DRIVER_FILES", driver.display().to_string())])
+            // Mesa's layer that chooses between GPUs has nothing to choose, and complains where there is no desktop.
+            let no_layer = ("NODEVICE_SELECT", "1".to_owned());
+            Ok(vec![("VK_DRIVER_FILES", driver.display().to_string()), no_layer])
         }
         Choice::Nothing => Err(CheckError::Failed(missing())),
     }

@@ -19,6 +19,12 @@ pub(super) fn place(shader: &LinkedShader, line: Option<u32>) -> String {
     found.unwrap_or_else(|| shader.path.display().to_string())
 }
 
+/// The line (from 1) of the linked text that declares `name`.
+pub(super) fn line_of(shader: &LinkedShader, name: &str) -> Option<u32> {
+    let line = shader.wgsl.lines().position(|line| declared_name(line) == Some(name))?;
+    u32::try_from(line + 1).ok()
+}
+
 /// The last declaration that opens at or before this line (from 0). Declarations open at the left margin.
 fn declaration_at(shader: &LinkedShader, line: usize) -> Option<&Declaration> {
     let lines: Vec<_> = shader.wgsl.lines().take(line + 1).collect();
