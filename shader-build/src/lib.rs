@@ -4,6 +4,12 @@
 //! linked with what it imports into one WGSL text, and a table of them is written for the crate to include:
 //!
 //! ```text
+//! # Cargo.toml
+//! [features]
+//! gpu = ["scene-core/gpu", "dep:gnomon-shader-build"]
+//! [build-dependencies]
+//! gnomon-shader-build = { workspace = true, optional = true }
+//!
 //! // build.rs
 //! fn main() {
 //!     #[cfg(feature = "gpu")]
