@@ -56,8 +56,8 @@ const SCENE_CORE_LINKS: &str = "gnomon_scene_core";
 const SHARED_VARIABLE: &str = "DEP_GNOMON_SCENE_CORE_SHADERS";
 
 /// Links the calling crate's `shaders/*.wesl` and `tests/shaders/*.wesl`, and writes `shaders.rs`,
-/// `test_shaders.rs` and the WGSL files to `OUT_DIR`. For
-/// build scripts only: a failure is told to Cargo as an error with file and line, and ends the build.
+/// `test_shaders.rs` and the WGSL files to `OUT_DIR`. For build scripts only: a failure is told to Cargo as an error
+/// with file and line, and ends the build.
 pub fn build() {
     if let Err(error) = try_build() {
         for line in error.to_string().lines() {
