@@ -101,6 +101,11 @@ pub(crate) struct TruthArgs {
     /// A light without extent takes one, whatever this says. The error falls about as N^-0.75.
     #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub(crate) samples: u32,
+    /// Compute the visible part of the light's area without sampling: slow, and free of noise
+    ///
+    /// For rect and disk lights and those without extent, and casters without cut-out masks.
+    #[arg(long, conflicts_with = "samples")]
+    pub(crate) exact: bool,
 }
 
 /// `gnomon compare`.
@@ -171,6 +176,7 @@ pub(crate) struct RenderArgs {
 Examples:
   gnomon reference cornell --out out/truth
   gnomon reference dragon.obj --samples 1024 --size 512x512 --out out/dragon-truth
+  gnomon reference quads --exact --out out/exact
 
 Writes image.png, visibility.png and report.json as `render` does, and NumPy arrays: visibility.npy and \
 std_error.npy (float32, H×W: V and the standard error of each pixel's V, NaN where nothing is seen), valid.npy \

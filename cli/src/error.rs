@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use scene_core::camera::CameraError;
 use scene_core::io::write::WriteError;
 use scene_core::metrics::MetricsError;
+use scene_core::reference::{Cancelled, ExactError};
 use scene_core::technique::{SettingsError, TechniqueError};
 use thiserror::Error;
 
@@ -51,8 +52,10 @@ pub(crate) enum CliError {
     NoGpu { technique: &'static str },
     #[error("the technique's image cannot be compared with ground truth")]
     Metrics(#[from] MetricsError),
-    #[error("cancelled")]
-    Cancelled,
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    #[error("--exact")]
+    Exact(#[from] ExactError),
     #[error("cannot start the threads: {0}")]
     Threads(String),
     #[error("cannot encode {what}")]

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 use scene_core::bvh::Bvh;
-use scene_core::reference::{Cancelled, ReferenceSettings, reference, valid_pixels};
+use scene_core::reference::{Reference, ReferenceSettings, exact_reference, reference, valid_pixels};
 use scene_core::{GBuffer, Report, VisibilityImage};
 use serde_json::json;
 
@@ -40,12 +40,17 @@ pub(crate) fn trace(
     seed: u64,
     console: &Console,
 ) -> Result<(GroundTruth, RunReport), CliError> {
-    let bar = console.progress(format!("ground truth, {}", count_of(args.samples as usize, "sample")));
+    let (variant, settings) = if args.exact {
+        ("exact".to_owned(), json!({ "exact": true }))
+    } else {
+        let variant = count_of(args.samples as usize, "sample") + " a pixel";
+        (variant, json!({ "samples": args.samples, "seed": seed }))
+    };
+    let bar = console.progress(format!("ground truth, {variant}"));
     let progress = |fraction: f32| {
         bar.set(fraction);
         ControlFlow::Continue(())
     };
-    let settings = ReferenceSettings { samples: args.samples, seed };
     let (scene, light) = (&view.setup.scene, view.light());
     let mut report = Report::default();
     let start = Instant::now();
@@ -53,20 +58,20 @@ pub(crate) fn trace(
     report.bytes = bvh.bytes() as u64;
     let prepare_ms = milliseconds_since(start);
     let start = Instant::now();
-    let traced = report
-        .time("shade.rays", |_| reference(scene, &bvh, light, gbuffer, &settings, &progress))
-        .map_err(|Cancelled| CliError::Cancelled)?;
+    let traced = report.time("shade.rays", |_| -> Result<Reference, CliError> {
+        if args.exact {
+            return Ok(exact_reference(scene, &bvh, light, gbuffer, &progress)?);
+        }
+        let sampling = ReferenceSettings { samples: args.samples, seed };
+        Ok(reference(scene, &bvh, light, gbuffer, &sampling, &progress)?)
+    })?;
     let shade_ms = milliseconds_since(start);
     let truth = GroundTruth {
         visibility: traced.visibility,
         std_error: traced.std_error,
         valid: valid_pixels(gbuffer, light),
     };
-    let subject = Subject {
-        technique: "reference".to_owned(),
-        variant: count_of(args.samples as usize, "sample") + " a pixel",
-        settings: json!({ "samples": args.samples, "seed": seed }),
-    };
+    let subject = Subject { technique: "reference".to_owned(), variant, settings };
     Ok((truth, RunReport::cpu(view, subject, prepare_ms, shade_ms, report)))
 }
 

@@ -2,19 +2,27 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
+use gnomon_scene_core::geometry::Aabb;
+
 fn main() {
     for path in std::env::args_os().skip(1).map(PathBuf::from) {
         let start = Instant::now();
         match gnomon_scene_core::io::load_setup(&path) {
             Ok(setup) => {
                 let scene = &setup.scene;
+                // The ground that a bare mesh is given is no part of it.
+                let bounds = scene
+                    .objects()
+                    .iter()
+                    .filter(|object| object.flags.casts)
+                    .fold(Aabb::EMPTY, |bounds, object| bounds.union(object.bounds));
                 println!(
-                    "{}: {} triangles, {} objects, {:?} … {:?}, {:.0} ms",
+                    "{}: {} casting triangles, {} objects, {:?} … {:?}, {:.0} ms",
                     setup.name,
-                    scene.triangles().len(),
+                    scene.caster_count(),
                     scene.objects().len(),
-                    scene.bounds().min.to_array(),
-                    scene.bounds().max.to_array(),
+                    bounds.min.to_array(),
+                    bounds.max.to_array(),
                     start.elapsed().as_secs_f64() * 1e3,
                 );
                 println!("  {:?}\n  {:?}", setup.camera, setup.lights);

@@ -150,10 +150,17 @@ impl Camera {
     /// The ray through pixel position `pixel` (pixel (0, 0) has its centre at (0.5, 0.5)): world-space
     /// direction whose length is 1 along the view direction, so that `eye + t·direction` lies at depth `t`.
     pub fn ray_direction(&self, pixel: Vec2) -> Vec3 {
-        let tan = self.tan_half_fov();
-        let x = (2.0 * pixel.x / self.width as f32 - 1.0) * tan.x;
-        let y = (1.0 - 2.0 * pixel.y / self.height as f32) * tan.y;
-        self.world_from_view_rotation() * Vec3::new(x, y, -1.0)
+        self.rays().direction(pixel)
+    }
+
+    /// What rays have in common, for many of them: [`CameraRays::direction`] is
+    /// [`ray_direction`](Self::ray_direction), bit for bit.
+    pub fn rays(&self) -> CameraRays {
+        CameraRays {
+            world_from_view: self.world_from_view_rotation(),
+            tan_half_fov: self.tan_half_fov(),
+            size: Vec2::new(self.width as f32, self.height as f32),
+        }
     }
 
     /// The same camera with another image size; the vertical field of view stays.
@@ -165,6 +172,24 @@ impl Camera {
     /// Pixels of the image.
     pub fn pixel_count(&self) -> usize {
         self.width as usize * self.height as usize
+    }
+}
+
+/// Rays of one camera, see [`Camera::rays`].
+#[derive(Clone, Copy, Debug)]
+pub struct CameraRays {
+    world_from_view: Mat3,
+    tan_half_fov: Vec2,
+    size: Vec2,
+}
+
+impl CameraRays {
+    /// The ray through pixel position `pixel`, as [`Camera::ray_direction`] gives it.
+    #[inline]
+    pub fn direction(&self, pixel: Vec2) -> Vec3 {
+        let x = (2.0 * pixel.x / self.size.x - 1.0) * self.tan_half_fov.x;
+        let y = (1.0 - 2.0 * pixel.y / self.size.y) * self.tan_half_fov.y;
+        self.world_from_view * Vec3::new(x, y, -1.0)
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Data flows one way: a [`Scene`](geometry::Scene) is loaded ([`io`]) or generated ([`scenes`]), a technique
 //! *prepares* what depends on scene and light, *shades* a [`GBuffer`], and the resulting
-//! [`VisibilityImage`] is held against ground truth ([`reference`]) by [`metrics`].
+//! [`VisibilityImage`] is held against ground truth ([`mod@reference`]) by [`metrics`].
 //!
 //! | module | what it holds |
 //! | --- | --- |
@@ -13,7 +13,7 @@
 //! | [`scenes`] | built-in procedural scenes |
 //! | [`raster`] | the CPU rasteriser: depth from any projection, G-buffer |
 //! | [`bvh`] | closest hit and packets of shadow rays |
-//! | [`reference`] | ray-traced ground truth and which pixels may be compared |
+//! | [`mod@reference`] | ray-traced ground truth and which pixels may be compared |
 //! | [`metrics`] | errors of a visibility image |
 //! | [`technique`] | the [`ShadowTechnique`] trait, settings, reports |
 //! | `gpu` | its GPU half, with the feature of that name |

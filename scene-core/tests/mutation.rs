@@ -117,7 +117,7 @@ const NUMBERS: [&str; 16] = [
 fn runs(bytes: &[u8], belongs: impl Fn(u8) -> bool) -> Vec<std::ops::Range<usize>> {
     let mut runs = Vec::new();
     let mut start = None;
-    for (at, &byte) in bytes.iter().chain(&[b'\n']).enumerate() {
+    for (at, &byte) in bytes.iter().chain(b"\n").enumerate() {
         match (start, belongs(byte) && at < bytes.len()) {
             (None, true) => start = Some(at),
             (Some(from), false) => {

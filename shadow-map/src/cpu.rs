@@ -10,7 +10,7 @@ use scene_core::raster::{
 use scene_core::{GBuffer, Light, Scene, VisibilityImage};
 
 use crate::light_views::LightView;
-use crate::receiver_plane::{is_behind, rises_above, view_tolerance};
+use crate::receiver_plane::{is_behind, is_near, meets, rises_above, view_tolerance};
 
 /// What the light sees through one view: depth and triangle a texel.
 #[derive(Clone, Debug)]
@@ -66,8 +66,8 @@ pub struct Lookup<'a> {
 struct Occluder {
     point: Vec3,
     triangle: usize,
-    /// How far `point` may be off across the light's ray, world units: the rasteriser's snapping.
-    lateral_error: f32,
+    /// Diagonal of the texel at the point's distance, world units.
+    texel: f32,
 }
 
 impl Lookup<'_> {
@@ -85,7 +85,7 @@ impl Lookup<'_> {
         (depth > 0.0).then(|| Occluder {
             point: map.view.unproject(Vec2::new(center.x - 1.0, 1.0 - center.y), depth),
             triangle: map.triangles[row * count + column] as usize,
-            lateral_error: map.view.half_diagonal(depth) * (2.0 / size) * DEPTH_POSITION_ERROR,
+            texel: map.view.half_diagonal(depth) * (2.0 / size),
         })
     }
 
@@ -93,9 +93,14 @@ impl Lookup<'_> {
     #[inline]
     fn hard(&self, receiver: Vec3, normal: Vec3, depth: f32) -> f32 {
         let tolerance = self.tolerance + view_tolerance(depth);
+        let light = self.light.center();
         let shadowed = self.occluder(receiver).is_some_and(|occluder| {
-            rises_above(occluder.point, receiver, normal, tolerance + occluder.lateral_error)
-                && is_behind(self.scene.corners(occluder.triangle), receiver, self.light.center(), tolerance)
+            let corners = self.scene.corners(occluder.triangle);
+            let snapping = occluder.texel * DEPTH_POSITION_ERROR;
+            rises_above(occluder.point, receiver, normal, tolerance + snapping)
+                && is_behind(corners, receiver, light, tolerance)
+                && (!is_near(occluder.point, receiver, normal, light, occluder.texel)
+                    || meets(corners, receiver, light))
         });
         if shadowed { 0.0 } else { 1.0 }
     }
@@ -132,15 +137,6 @@ impl Lookup<'_> {
             is_behind(corners, point, light, self.tolerance) && meets(corners, point, light)
         })
     }
-}
-
-/// Whether the line from `point` towards the light passes between the corners, by the signs of the volumes it
-/// spans with the edges.
-fn meets(corners: [Vec3; 3], point: Vec3, light: LightPoint) -> bool {
-    let (direction, _) = light.ray_from(point);
-    let [a, b, c] = corners.map(|corner| corner - point);
-    let sides = [a.cross(b), b.cross(c), c.cross(a)].map(|normal| normal.dot(direction));
-    sides.iter().all(|&side| side >= 0.0) || sides.iter().all(|&side| side <= 0.0)
 }
 
 /// `shade.lookup`: V of every pixel that sees a surface, NaN elsewhere.

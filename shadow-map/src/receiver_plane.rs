@@ -10,11 +10,18 @@
 //! 2. *Does the receiver lie behind the stored triangle's plane?* A triangle shadows only what is behind its
 //!    plane as seen from the light. A lit wall beside the receiver is not behind itself: concave corners.
 //!
-//! The receiver is in shadow if both hold. The second never rejects a true shadow; the first can, within one
-//! texel of the receiver: that is the contact gap, at most the texel's footprint on the receiver.
+//! Both hold for every true shadow that the texel's centre is in, and for some neighbours on a rugged surface
+//! too: the rim of a pit lies above its wall, the wall behind the rim's plane, and still the wall may see the
+//! light. So a third question follows where it matters:
+//!
+//! 3. *Is the stored point near the receiver*, nearer than a surface rises within a texel? Then the stored
+//!    triangle is asked outright, by the receiver's own ray.
+//!
+//! What is lost is a caster that is nearer to its receiver than that and smaller than a texel: a contact gap of
+//! at most a texel's diagonal times 1 + tan θ along the light. Casters larger than a texel leave no gap.
 //!
 //! # Tolerance
-//! Both questions are signed distances to a plane, and differ from the true ones by rounding only: positions
+//! The first two are signed distances to a plane, and differ from the true ones by rounding only: positions
 //! from the G-buffer, the map's depth and the dot product each carry a few units in the last place of the
 //! largest coordinate in play. See [`plane_tolerance`]. The first adds what the rasteriser's snapping moves a
 //! stored point across the light's ray, 2⁻⁹ texel ([`scene_core::raster::DEPTH_POSITION_ERROR`]).
@@ -71,6 +78,29 @@ pub fn is_behind(corners: [Vec3; 3], receiver: Vec3, light: LightPoint, toleranc
         && if side > 0.0 { -height > tolerance * length } else { side < 0.0 && height > tolerance * length }
 }
 
+/// Question 3: whether `stored` may be a neighbour of `receiver` on one surface: nearer along the light's ray
+/// than a surface rises within a texel of diagonal `texel`. The receiver's own slope against the light is
+/// tan θ; its neighbours are given twice that and, where the receiver faces the light, twice 45°, over the half
+/// diagonal that lies between a receiver and its texel's centre: `texel`·(1 + tan θ).
+#[inline]
+pub fn is_near(stored: Vec3, receiver: Vec3, normal: Vec3, light: LightPoint, texel: f32) -> bool {
+    let (to_light, _) = light.ray_from(receiver);
+    let to_light = to_light.normalize_or_zero();
+    let cos = normal.dot(to_light).max(f32::MIN_POSITIVE);
+    let tan = (1.0 - cos * cos).max(0.0).sqrt() / cos;
+    (stored - receiver).dot(to_light) <= texel * (1.0 + tan)
+}
+
+/// Whether the line from `point` towards the light passes between the corners, by the signs of the volumes it
+/// spans with the edges. Where the triangle lies along the line is not asked.
+#[inline]
+pub fn meets(corners: [Vec3; 3], point: Vec3, light: LightPoint) -> bool {
+    let (direction, _) = light.ray_from(point);
+    let [a, b, c] = corners.map(|corner| corner - point);
+    let sides = [a.cross(b), b.cross(c), c.cross(a)].map(|normal| normal.dot(direction));
+    sides.iter().all(|&side| side >= 0.0) || sides.iter().all(|&side| side <= 0.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -88,6 +118,22 @@ mod tests {
         // On the plane, or edge-on: not behind.
         assert!(!is_behind(CORNERS, Vec3::new(9.0, 0.0, 9.0), above, 1e-6));
         assert!(!is_behind(CORNERS, under, LightPoint::Towards(Vec3::X), 1e-6));
+    }
+
+    #[test]
+    fn near_grows_with_the_slope() {
+        let light = LightPoint::Towards(Vec3::Y);
+        let slope = Vec3::new(2.0, 1.0, 0.0).normalize();
+        let rise = |height: f32, normal: Vec3| is_near(Vec3::Y * height, Vec3::ZERO, normal, light, 0.1);
+        assert!(rise(0.099, Vec3::Y) && !rise(0.11, Vec3::Y));
+        assert!(rise(0.299, slope) && !rise(0.31, slope));
+    }
+
+    #[test]
+    fn a_line_meets_what_it_passes_through() {
+        let light = LightPoint::At(Vec3::new(0.2, 5.0, 0.2));
+        assert!(meets(CORNERS, Vec3::new(0.2, -1.0, 0.2), light));
+        assert!(!meets(CORNERS, Vec3::new(2.0, -1.0, 0.2), light));
     }
 
     #[test]

@@ -35,18 +35,22 @@ pub(crate) fn linear_from_oklch(lightness: f32, chroma: f32, hue_deg: f32) -> Ve
     )
 }
 
-/// The muted albedo of an object, stable by its id: the first is nearly grey; then hue goes in golden-angle steps
-/// and lightness in steps of the golden ratio, so that neighbours in the list never look alike.
+/// The muted albedo of an object, stable by its id: the first two, often a mesh and its ground, are nearly grey,
+/// one warm, one cool; then hue goes in golden-angle steps and lightness in steps of the golden ratio, so that
+/// neighbours in the list never look alike.
 pub(crate) fn object_albedo(id: u32) -> Vec3 {
     const GOLDEN_ANGLE_DEG: f32 = 137.508;
     const GOLDEN_RATIO: f32 = 0.618_034;
-    if id == 0 {
-        return linear_from_oklch(0.80, 0.012, 80.0);
+    match id {
+        0 => linear_from_oklch(0.80, 0.02, 75.0),
+        1 => linear_from_oklch(0.74, 0.012, 250.0),
+        _ => {
+            // The palette repeats long after anyone could tell.
+            let step = (id % 4096) as f32;
+            let lightness = 0.64 + 0.20 * (step * GOLDEN_RATIO).fract();
+            linear_from_oklch(lightness, 0.045, (80.0 + step * GOLDEN_ANGLE_DEG) % 360.0)
+        }
     }
-    // The palette repeats long after anyone could tell.
-    let step = (id % 4096) as f32;
-    let lightness = 0.64 + 0.20 * (step * GOLDEN_RATIO).fract();
-    linear_from_oklch(lightness, 0.05, (80.0 + step * GOLDEN_ANGLE_DEG) % 360.0)
 }
 
 #[cfg(test)]

@@ -118,6 +118,25 @@ fn reference_writes_values_that_belong_together() {
 }
 
 #[test]
+fn exact_truth_is_what_sampled_truth_tends_to() {
+    let bench = Workbench::new();
+    let command = ["reference", "quads", "--size", "32x24", "--out"];
+    bench.done(&[&command[..], &["exact", "--exact"]].concat());
+    bench.done(&[&command[..], &["sampled", "--samples", "1024"]].concat());
+    let (_, exact) = bench.npy::<f32>("exact/visibility.npy");
+    let (_, sampled) = bench.npy::<f32>("sampled/visibility.npy");
+    let (_, error) = bench.npy::<f32>("sampled/std_error.npy");
+    let (_, valid) = bench.npy::<bool>("exact/valid.npy");
+    for pixel in (0..exact.len()).filter(|&pixel| valid[pixel]) {
+        // Six standard errors: a false alarm once in 10⁸ pixels. Where all samples agree the error is told as if
+        // one stratum were split.
+        let difference = (exact[pixel] - sampled[pixel]).abs();
+        assert!(difference <= 6.0 * error[pixel], "pixel {pixel}: {difference} at {}", error[pixel]);
+    }
+    assert_eq!(bench.json("exact/report.json")["variant"], "exact");
+}
+
+#[test]
 fn truth_depends_on_the_seed_and_not_on_threads() {
     let bench = Workbench::new();
     let values = |more: &[&str]| {

@@ -17,7 +17,7 @@ use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8};
 
 use super::exact;
 use super::shaft::{Shaft, ShaftLanes};
-use super::tree::{Block, WIDTH};
+use super::tree::Block;
 
 /// 12 u: see the module's derivation.
 pub(super) const ERROR: f32 = 12.0 / (1_u32 << 24) as f32;
@@ -25,31 +25,20 @@ pub(super) const ERROR: f32 = 12.0 / (1_u32 << 24) as f32;
 /// Above what underflow adds: see the module's derivation.
 pub(super) const TINY: f32 = f32::from_bits((127 - 100) << 23);
 
-/// What is left of a block after the shaft has culled its triangles, by coefficient and lane.
-pub(super) struct Candidates {
+/// What is left of a block after the shaft has culled its triangles.
+pub(super) struct Candidates<S: Simd> {
     /// Lanes that some ray of the shaft may cross.
     pub(super) lanes: u32,
     /// Per edge n_x, n_y and n_z + B, turned so that inside is positive; B is the edge's error bound.
-    pub(super) edges: [[[f32; WIDTH]; 3]; 3],
+    pub(super) edges: [[f32x8<S>; 3]; 3],
     /// Per edge 2 B.
-    pub(super) twice_bound: [[f32; WIDTH]; 3],
+    pub(super) twice_bound: [f32x8<S>; 3],
     /// The plane's normal N, turned alike.
-    pub(super) normal: [[f32; WIDTH]; 3],
+    pub(super) normal: [f32x8<S>; 3],
     /// The absolute products of N, times the error constant.
-    pub(super) normal_error: [[f32; WIDTH]; 3],
+    pub(super) normal_error: [f32x8<S>; 3],
     /// The first corner.
-    pub(super) corner: [[f32; WIDTH]; 3],
-}
-
-impl Candidates {
-    pub(super) const NONE: Self = Self {
-        lanes: 0,
-        edges: [[[0.0; WIDTH]; 3]; 3],
-        twice_bound: [[0.0; WIDTH]; 3],
-        normal: [[0.0; WIDTH]; 3],
-        normal_error: [[0.0; WIDTH]; 3],
-        corner: [[0.0; WIDTH]; 3],
-    };
+    pub(super) corner: [f32x8<S>; 3],
 }
 
 /// a × b, and its products taken absolute.
@@ -74,13 +63,11 @@ pub(super) fn cull<S: Simd>(
     lanes: &ShaftLanes<S>,
     block: &Block,
     count: usize,
-    out: &mut Candidates,
-) {
+) -> Option<Candidates<S>> {
     let corners = lanes.block_corners(block);
     let mut left = !lanes.outside(&corners).to_bitmask() as u32 & ((1 << count) - 1);
-    out.lanes = left;
     if left == 0 {
-        return;
+        return None;
     }
     let [a, b, c] = corners;
     let (normal, products) = cross(subtract(b, a), subtract(c, a));
@@ -98,30 +85,30 @@ pub(super) fn cull<S: Simd>(
         }
         turn[lane] = side.signum() as f32;
     }
-    let widest = |i: usize| lanes.slopes[i][0].abs().max(lanes.slopes[i][1].abs());
-    let (wide_x, wide_y) = (widest(0), widest(1));
+    let [x, y] = lanes.slopes;
+    let (wide_x, wide_y) = (x[0].abs().max(x[1].abs()), y[0].abs().max(y[1].abs()));
+    let mut edges = [[a[0]; 3]; 3];
+    let mut twice_bound = [a[0]; 3];
     for (edge, (from, to)) in [(a, b), (b, c), (c, a)].into_iter().enumerate() {
         let sum = [to[0] + from[0], to[1] + from[1], to[2] + from[2]];
         let (n, p) = cross(sum, subtract(to, from));
-        let n = n.map(|v| v * turn);
+        let n = [n[0] * turn, n[1] * turn, n[2] * turn];
         let bound = p[0].mul_add(wide_x, p[1].mul_add(wide_y, p[2])).mul_add(ERROR, TINY);
         let lifted = n[2] + bound;
-        let most = (n[0] * lanes.slopes[0][0]).max(n[0] * lanes.slopes[0][1])
-            + (n[1] * lanes.slopes[1][0]).max(n[1] * lanes.slopes[1][1])
-            + lifted;
+        let most = (n[0] * x[0]).max(n[0] * x[1]) + (n[1] * y[0]).max(n[1] * y[1]) + lifted;
         left &= !(most.simd_lt(0.0).to_bitmask() as u32);
-        n[0].store_array(&mut out.edges[edge][0]);
-        n[1].store_array(&mut out.edges[edge][1]);
-        lifted.store_array(&mut out.edges[edge][2]);
-        (bound + bound).store_array(&mut out.twice_bound[edge]);
+        edges[edge] = [n[0], n[1], lifted];
+        twice_bound[edge] = bound + bound;
     }
-    out.lanes = left;
     if left == 0 {
-        return;
+        return None;
     }
-    for axis in 0..3 {
-        (normal[axis] * turn).store_array(&mut out.normal[axis]);
-        (products[axis] * ERROR).store_array(&mut out.normal_error[axis]);
-        a[axis].store_array(&mut out.corner[axis]);
-    }
+    Some(Candidates {
+        lanes: left,
+        edges,
+        twice_bound,
+        normal: [normal[0] * turn, normal[1] * turn, normal[2] * turn],
+        normal_error: [products[0] * ERROR, products[1] * ERROR, products[2] * ERROR],
+        corner: a,
+    })
 }

@@ -10,6 +10,9 @@ use super::walk::{self, Cutout};
 use super::{Bvh, Hit};
 use crate::light::LightPoint;
 
+/// Rays of a small packet, for which less is set up.
+const FEW: usize = 16;
+
 impl Bvh {
     /// The first triangle that the ray from `origin` along `direction` meets with `t_min ≤ t ≤ t_max`, t in
     /// units of the direction. Of triangles met at the very same place the one of lowest index.
@@ -20,10 +23,7 @@ impl Bvh {
         if !origin.is_finite() || !direction.is_finite() || direction == Vec3::ZERO {
             return None;
         }
-        let mut ends = [[0.0; MAX_RAYS]; 3];
-        for axis in 0..3 {
-            ends[axis][0] = direction[axis];
-        }
+        let ends = direction.to_array().map(|end| [end]);
         let (t_min, t_max) = (f64::from(t_min), f64::from(t_max));
         let fits = Shaft::can_reach(origin, self.tree.bounds);
         let first = dispatch!(self.level, simd => {
@@ -41,7 +41,7 @@ impl Bvh {
     /// Whether anything blocks the light that comes from `target` to `origin`. Nothing does if the two are one,
     /// the direction is zero, or a coordinate is not finite.
     pub fn is_occluded(&self, origin: Vec3, target: LightPoint) -> bool {
-        self.occluded_mask(origin, &[target]) != 0
+        self.occluded_packed::<1>(origin, &[target]) != 0
     }
 
     /// For each of `targets`, usually samples of one light, whether anything blocks it from `origin`; what
@@ -76,10 +76,18 @@ impl Bvh {
     /// [`Bvh::occluded_from`] for at most 64 targets, as bits: bit i says that target i is blocked. Targets past
     /// the 64th are ignored.
     pub fn occluded_mask(&self, origin: Vec3, targets: &[LightPoint]) -> u64 {
-        let mut ends = [[0.0; MAX_RAYS]; 3];
+        if targets.len() <= FEW {
+            self.occluded_packed::<FEW>(origin, targets)
+        } else {
+            self.occluded_packed::<MAX_RAYS>(origin, targets)
+        }
+    }
+
+    fn occluded_packed<const N: usize>(&self, origin: Vec3, targets: &[LightPoint]) -> u64 {
+        let mut ends = [[0.0; N]; 3];
         // Rays that stop, and rays that go on.
         let mut masks = [0_u64; 2];
-        for (ray, &target) in targets.iter().take(MAX_RAYS).enumerate() {
+        for (ray, &target) in targets.iter().take(N).enumerate() {
             let (end, kind) = match target {
                 LightPoint::At(point) => (point - origin, 0),
                 LightPoint::Towards(direction) => (direction, 1),
@@ -97,7 +105,13 @@ impl Bvh {
         self.occluded_ends(origin, &ends, masks[0], true) | self.occluded_ends(origin, &ends, masks[1], false)
     }
 
-    fn occluded_ends(&self, origin: Vec3, ends: &[[f32; MAX_RAYS]; 3], mask: u64, finite: bool) -> u64 {
+    fn occluded_ends<const N: usize>(
+        &self,
+        origin: Vec3,
+        ends: &[[f32; N]; 3],
+        mask: u64,
+        finite: bool,
+    ) -> u64 {
         if mask == 0 {
             return 0;
         }
@@ -144,9 +158,15 @@ impl Bvh {
     }
 
     #[cold]
-    fn occluded_slowly(&self, origin: Vec3, ends: &[[f32; MAX_RAYS]; 3], mask: u64, finite: bool) -> u64 {
+    fn occluded_slowly<const N: usize>(
+        &self,
+        origin: Vec3,
+        ends: &[[f32; N]; 3],
+        mask: u64,
+        finite: bool,
+    ) -> u64 {
         let mut blocked = 0;
-        for ray in (0..MAX_RAYS).filter(|ray| mask >> ray & 1 == 1) {
+        for ray in (0..N).filter(|ray| mask >> ray & 1 == 1) {
             let end = Vec3::from_array(ends.map(|axis| axis[ray]));
             self.each_candidate(origin, end, |link, lane, corners| {
                 let crosses = if finite {
@@ -187,9 +207,9 @@ impl Bvh {
 
 /// A part of the rays in `mask`, neither none nor all of them: those on one side of the origin along an axis that
 /// parts them, else every second one.
-fn half_of(ends: &[[f32; MAX_RAYS]; 3], mask: u64) -> u64 {
+fn half_of<const N: usize>(ends: &[[f32; N]; 3], mask: u64) -> u64 {
     for axis in ends {
-        let positive = (0..MAX_RAYS).filter(|&ray| axis[ray] > 0.0).fold(0_u64, |bits, ray| bits | 1 << ray);
+        let positive = (0..N).filter(|&ray| axis[ray] > 0.0).fold(0_u64, |bits, ray| bits | 1 << ray);
         let half = mask & positive;
         if half != 0 && half != mask {
             return half;

@@ -25,6 +25,8 @@ pub(super) const WIDTH: usize = 8;
 pub(super) struct Link(u32);
 
 impl Link {
+    /// Leads nowhere in particular: what unused slots hold.
+    pub(super) const NONE: Self = Self(0);
     const LEAF: u32 = 1 << 31;
     const COUNT_SHIFT: u32 = 28;
     const INDEX: u32 = (1 << Self::COUNT_SHIFT) - 1;
@@ -225,7 +227,7 @@ impl<'a> Collapse<'a> {
         let empty = Node {
             lo: [[f32::INFINITY; WIDTH]; 3],
             hi: [[f32::NEG_INFINITY; WIDTH]; 3],
-            links: [Link(0); WIDTH],
+            links: [Link::NONE; WIDTH],
             count: 0,
         };
         tree.nodes.push(empty.clone());

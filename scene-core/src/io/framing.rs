@@ -2,22 +2,24 @@
 //!
 //! With r half the diagonal of the geometry's box and c its middle:
 //!
-//! - **light**: a square of half side 0.3 r, 2.5 r from c, facing c; 55° above the horizon, 50° to the right
+//! - **light**: a square of half side 0.3 r, 2.5 r from c, facing c; 60° above the horizon, 50° to the right
 //!   of the front. It lies outside the ball around the box and above its top, whatever the box's shape.
 //! - **ground**: if neither a camera nor a light is given, a square just below the lowest point, at least
 //!   4 r to each side of c and large enough for the whole penumbra. It receives and does not cast: nothing
 //!   is below it. It is 2⁻¹³ of the diagonal lower (an eighth of a pixel of the picture), so that it does not
 //!   coincide with a floor; a mesh that is flat itself floats 0.05 r above it, so that its shadow is seen.
 //! - **camera**: 25° above the horizon, 30° to the left of the front, 40° field of view, as near as possible
-//!   with the box and its shadow in the picture.
+//!   with the box and its shadow (from the light's middle) in the picture.
 //!
 //! The front is +z for +y up (as in glTF), −y for +z up, +y for +x up. The rule holds at any scale and place
-//! that f32 resolves; for a *room* see [`complete`].
+//! that f32 resolves. It is made for objects: a closed room is seen from outside, and needs a scene file with
+//! a camera and a light inside.
 
 use glam::{Affine3A, DVec3, Vec3};
 use thiserror::Error;
 
 use crate::geometry::{Aabb, ObjectFlags, SceneError};
+use crate::light::LightPoint;
 use crate::{Camera, Light, SceneSetup, TriangleMesh};
 
 /// Pixels of each side of a picture whose size nobody gave.
@@ -159,7 +161,7 @@ impl Extent {
 /// Geometry that is empty, or whose size or place leaves what f32 resolves.
 pub fn framed_light(bounds: Aabb, up: UpAxis) -> Result<Light, FramingError> {
     let extent = Extent::of(bounds)?;
-    let towards = up.towards(50.0, 55.0);
+    let towards = up.towards(50.0, 60.0);
     let [_, up, _] = up.axes();
     let half_u = up.cross(towards).normalize();
     let half_v = towards.cross(half_u);
@@ -179,7 +181,9 @@ pub fn framed_ground(bounds: Aabb, up: UpAxis) -> Result<TriangleMesh, FramingEr
     let light = framed_light(bounds, up)?;
     let [right, up, front] = up.axes();
     let height = extent.ground_height(up);
-    let reach = shadow_on_ground(&extent, &light, up, height)
+    let reach = light_corners(&light)
+        .into_iter()
+        .flat_map(|light| shadow_on_ground(&extent, light, up, height))
         .map(|p| (p - extent.center).dot(right).abs().max((p - extent.center).dot(front).abs()))
         .fold(0.0, f64::max);
     let half = (1.2 * reach).max(4.0 * extent.radius);
@@ -189,21 +193,22 @@ pub fn framed_ground(bounds: Aabb, up: UpAxis) -> Result<TriangleMesh, FramingEr
     Ok(TriangleMesh::new("ground", positions, vec![[0, 1, 2], [0, 2, 3]]))
 }
 
-/// Where the box's corners throw their shadows, seen from the light's corners: the outline of the penumbra.
-fn shadow_on_ground(extent: &Extent, light: &Light, up: DVec3, height: f64) -> impl Iterator<Item = DVec3> {
-    let corners = extent.corners();
-    let points = match *light {
+/// The corners of the rule's light: its shadows lie between theirs.
+fn light_corners(light: &Light) -> Vec<DVec3> {
+    match *light {
         Light::Rect { center, half_u, half_v } => {
             let [c, u, v] = [center, half_u, half_v].map(Vec3::as_dvec3);
             vec![c + u + v, c + u - v, c - u + v, c - u - v]
         }
         _ => Vec::new(),
-    };
-    points.into_iter().flat_map(move |light| {
-        corners.into_iter().map(move |corner| {
-            let along = (light.dot(up) - height) / (light.dot(up) - corner.dot(up));
-            light + (corner - light) * along
-        })
+    }
+}
+
+/// Where the box's corners throw their shadows, seen from a point that lies above all of them.
+fn shadow_on_ground(extent: &Extent, light: DVec3, up: DVec3, height: f64) -> [DVec3; 8] {
+    extent.corners().map(|corner| {
+        let along = (light.dot(up) - height) / (light.dot(up) - corner.dot(up));
+        light + (corner - light) * along
     })
 }
 
@@ -217,13 +222,15 @@ pub fn framed_camera(bounds: Aabb, up: UpAxis, width: u32, height: u32) -> Resul
     let towards = up.towards(-30.0, 25.0);
     let [_, up_axis, _] = up.axes();
     let ground = extent.ground_height(up_axis);
-    let points: Vec<DVec3> =
-        extent.corners().into_iter().chain(shadow_on_ground(&extent, &light, up_axis, ground)).collect();
+    let mut points = extent.corners().to_vec();
+    if let LightPoint::At(middle) = light.center() {
+        points.extend(shadow_on_ground(&extent, middle.as_dvec3(), up_axis, ground));
+    }
 
     let right = up_axis.cross(towards).normalize();
     let upright = towards.cross(right);
-    // A frame of a twelfth stays free on each side.
-    let tan_y = f64::from(DEFAULT_FOV_Y_DEG.to_radians() * 0.5).tan() * (5.0 / 6.0);
+    // A tenth stays free on each side: the outer half of the penumbra falls there.
+    let tan_y = f64::from(DEFAULT_FOV_Y_DEG.to_radians() * 0.5).tan() * 0.9;
     let tan_x = tan_y * f64::from(width.max(1)) / f64::from(height.max(1));
     // A point at `a` along an axis of the picture and `c` towards the camera is inside if
     // |a − e| ≤ tan · (d − c), with the eye at `e` and `d`. So d must part the bounds of all points for e.

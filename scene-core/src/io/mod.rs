@@ -12,7 +12,7 @@
 //! repair. Broken input is a [`LoadError`] that names file and place; it is never a panic, and the memory
 //! taken is bounded by the size of the files and by [`Limits`].
 //!
-//! [`write`] holds the writers of PNG, EXR, `.npy` and JSON.
+//! [`mod@write`] holds the writers of PNG, EXR, `.npy` and JSON.
 
 mod error;
 mod file;

@@ -84,6 +84,7 @@ fn resolve(scene: &Scene, camera: &Camera, gbuffer: &mut GBuffer) {
     if width == 0 {
         return;
     }
+    let rays = camera.rays();
     let (eye, forward) = (camera.eye.as_dvec3(), camera.forward().as_dvec3());
     let (near, far) = (f64::from(camera.near), f64::from(camera.far));
     let rows = gbuffer.position.par_chunks_mut(width).zip(gbuffer.normal.par_chunks_mut(width));
@@ -99,7 +100,7 @@ fn resolve(scene: &Scene, camera: &Camera, gbuffer: &mut GBuffer) {
             if plane.triangle != triangle[x] {
                 plane = Plane::new(scene, triangle[x], eye, forward);
             }
-            let direction = camera.ray_direction(Vec2::new(x as f32 + 0.5, y as f32 + 0.5)).as_dvec3();
+            let direction = rays.direction(Vec2::new(x as f32 + 0.5, y as f32 + 0.5)).as_dvec3();
             let t = plane.hit(direction).clamp(near, far);
             depth[x] = t as f32;
             position[x] = (eye + direction * t).as_vec3();

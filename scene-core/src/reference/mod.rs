@@ -1,6 +1,6 @@
 //! Ray-traced ground truth, and which pixels may be compared.
 //!
-//! [`reference`] is what every technique is held against: V by many shadow rays a pixel, with an estimate of
+//! [`reference()`] is what every technique is held against: V by many shadow rays a pixel, with an estimate of
 //! its own error. [`valid_pixels`] says where a comparison means anything.
 
 mod exact;

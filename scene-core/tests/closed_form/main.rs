@@ -209,10 +209,11 @@ fn disk_under_a_disk_is_a_lens() {
 
 const BALL: (DVec3, f64) = (DVec3::new(0.0, 1.0, 0.0), 0.35);
 
-fn ball_truth(x: DVec3, light: DVec3, radius: f64) -> f64 {
+/// V of a sphere light for a ball of radius `ball` about [`BALL`]'s middle.
+fn ball_truth(x: DVec3, ball: f64, light: DVec3, radius: f64) -> f64 {
     let to_light = light - x;
     let to_ball = BALL.0 - x;
-    let (a, b) = ((radius / to_light.length()).asin(), (BALL.1 / to_ball.length()).asin());
+    let (a, b) = ((radius / to_light.length()).asin(), (ball / to_ball.length()).asin());
     1.0 - formulas::common_caps(a, b, to_light.angle_between(to_ball)) / formulas::cap(a)
 }
 
@@ -223,7 +224,7 @@ fn ball_under_a_sphere_is_two_caps() {
         let light = Light::Sphere { center: Vec3::new(0.0, 3.0, 0.2), radius: radius as f32 };
         let gbuffer = floor(3000, reach);
         assert_agreement(&Scene::new(), &ball(BALL.0, BALL.1), &light, &gbuffer, |x| {
-            ball_truth(x, DVec3::new(0.0, 3.0, f64::from(0.2f32)), f64::from(radius as f32))
+            ball_truth(x, BALL.1, DVec3::new(0.0, 3.0, f64::from(0.2f32)), f64::from(radius as f32))
         });
     }
 }
@@ -237,7 +238,7 @@ fn scale_does_not_matter() {
     gbuffer.position.iter_mut().for_each(|p| *p *= scale);
     let scale = f64::from(scale);
     assert_agreement(&Scene::new(), &ball(BALL.0 * scale, BALL.1 * scale), &light, &gbuffer, |x| {
-        ball_truth(x / scale, DVec3::Y * 3.0, 0.5)
+        ball_truth(x / scale, BALL.1, DVec3::Y * 3.0, 0.5)
     });
 }
 
@@ -310,7 +311,7 @@ fn planted_faults_are_noticed() {
     assert!(agreement(&truth, &gbuffer, &sample(&Scene::new(), &casters, &larger, &gbuffer)).is_err());
     let higher = sheet(1.01, |p| DVec2::from_angle(-0.5).rotate(p).abs().max_element() < 0.25);
     assert!(agreement(&truth, &gbuffer, &sample(&Scene::new(), &higher, &light, &gbuffer)).is_err());
-    let wide = |x: DVec3| ball_truth(x, DVec3::Y * 3.0, 0.9);
+    let wide = |x: DVec3| ball_truth(x, BALL.1, DVec3::Y * 3.0, 0.9);
     let disk = Light::Disk { center: Vec3::Y * 3.0, normal: Vec3::Y, radius: 0.9 };
     let gbuffer = floor(3000, 1.3);
     assert!(

@@ -5,10 +5,15 @@
 //! UTF-8. One pass over the bytes, which costs a small part of the parsing, finds the faults with their
 //! lines and blanks what is not needed in place. Line numbers stay as in the file.
 
+use memchr::memchr;
+
 use super::ObjFault;
 
 /// Stands for a line feed that a backslash cancels; white space to `tobj`, a new line to [`line_of`].
 const CONTINUED: u8 = 0x0b;
+
+/// Digits of an index that cannot overflow 64 bits. One with more is refused, leading zeros or not.
+const MOST_DIGITS: usize = 18;
 
 /// A fault and its line, from 1.
 pub(super) type FaultAt = (usize, ObjFault);
@@ -33,23 +38,25 @@ pub(super) struct Scan {
 /// The first line that is broken, apart from numbers that do not parse: see [`locate`].
 pub(super) fn prepare(text: &mut [u8]) -> Result<Scan, FaultAt> {
     let mut scan = Scan::default();
-    if let Some(at) = text.iter().position(|&b| b == 0) {
+    if let Some(at) = memchr(0, text) {
         return Err((line_of(text, at), ObjFault::NotText(0)));
     }
-    if !text.contains(&b'\n') {
+    if memchr(b'\n', text).is_none() {
         replace(text, b'\r', b'\n');
     }
     replace(text, CONTINUED, b' ');
-    join_continued_lines(text);
+    let continued = join_continued_lines(text);
     let ascii = text.is_ascii();
-    let mut line = 1;
-    for statement in text.split_mut(|&b| b == b'\n') {
-        let continued = statement.iter().filter(|&&b| b == CONTINUED).count();
+    let (mut rest, mut line) = (text, 1);
+    while !rest.is_empty() {
+        let end = memchr(b'\n', rest).unwrap_or(rest.len());
+        let (statement, after) = rest.split_at_mut(end);
         if !ascii {
             scan.replaced_bytes |= replace_foreign_bytes(statement);
         }
         scan.check(statement).map_err(|fault| (line, fault))?;
-        line += 1 + continued;
+        line += 1 + if continued { count(CONTINUED, statement) } else { 0 };
+        rest = after.get_mut(1..).unwrap_or_default();
     }
     Ok(scan)
 }
@@ -112,82 +119,91 @@ impl Scan {
                 corners[at..].fill(b' ');
                 break;
             }
-            at += self.check_corner(&corners[at..])?;
+            let corner = &corners[at..];
+            at += corner.len() - self.check_corner(corner)?.len();
             count += 1;
         }
         if count < 3 { Err(ObjFault::Corners(count)) } else { Ok(()) }
     }
 
-    /// Checks the corner that `text` begins with and returns its length.
-    fn check_corner(&self, text: &[u8]) -> Result<usize, ObjFault> {
-        let broken = || ObjFault::Corner(first_word(text));
-        let mut at = 0;
-        for (part, (what, count)) in
-            [("vertex", self.vertices), ("texture coordinate", self.texcoords), ("normal", self.normals)]
-                .into_iter()
-                .enumerate()
-        {
-            let start = at;
-            let negative = text.get(at) == Some(&b'-');
-            at += usize::from(negative || text.get(at) == Some(&b'+'));
-            let digits = at;
+    /// Checks the corner that `text` begins with and returns what is behind it.
+    fn check_corner<'t>(&self, text: &'t [u8]) -> Result<&'t [u8], ObjFault> {
+        let broken = || Err(ObjFault::Corner(first_word(text)));
+        let mut rest = text;
+        for (part, count) in [self.vertices, self.texcoords, self.normals].into_iter().enumerate() {
+            let start = rest;
+            if let [b'-' | b'+', after @ ..] = rest {
+                rest = after;
+            }
+            let digits = rest;
             let mut index = 0usize;
-            while let Some(digit) = text.get(at).filter(|b| b.is_ascii_digit()) {
-                index = index.saturating_mul(10).saturating_add(usize::from(digit - b'0'));
-                at += 1;
+            while let [digit @ b'0'..=b'9', after @ ..] = rest {
+                // Wraps only beyond the digits that are checked below.
+                index = index.wrapping_mul(10).wrapping_add(usize::from(digit - b'0'));
+                rest = after;
             }
-            if at > digits {
-                if index == 0 || index > count {
-                    let index = String::from_utf8_lossy(&text[start..at]).into_owned();
-                    return Err(ObjFault::OutOfRange { what, index, count });
+            let length = digits.len() - rest.len();
+            if length > 0 {
+                if index == 0 || index > count || length > MOST_DIGITS {
+                    return Err(self.out_of_range(part, &start[..start.len() - rest.len()]));
                 }
-            } else if part == 0 || at > start {
-                return Err(broken());
+            } else if part == 0 || rest.len() < start.len() {
+                return broken();
             }
-            match text.get(at) {
-                None => return Ok(at),
-                Some(&b) if is_space(b) => return Ok(at),
-                Some(b'/') if part < 2 => at += 1,
-                Some(_) => return Err(broken()),
+            match rest {
+                [b'/', after @ ..] if part < 2 => rest = after,
+                [] => return Ok(rest),
+                [byte, ..] if is_space(*byte) => return Ok(rest),
+                _ => return broken(),
             }
         }
-        Ok(at)
+        Ok(rest)
+    }
+
+    /// The fault of an index that is zero, out of range, or longer than any that is in range.
+    fn out_of_range(&self, part: usize, index: &[u8]) -> ObjFault {
+        let (what, count) =
+            [("vertex", self.vertices), ("texture coordinate", self.texcoords), ("normal", self.normals)]
+                [part];
+        ObjFault::OutOfRange { what, index: first_word(index), count }
     }
 }
 
 /// Checks how many numbers a vertex has, and blanks its colour: shadows have none.
 fn check_position(numbers: &mut [u8]) -> Result<(), ObjFault> {
-    let (mut count, mut third_end, mut in_word, mut suspicious) = (0, 0, false, false);
-    for at in 0..numbers.len() {
-        match numbers[at] {
-            b if is_space(b) => in_word = false,
-            b'#' if !in_word => {
-                numbers[at..].fill(b' ');
-                break;
-            }
-            b => {
-                count += usize::from(!in_word);
-                in_word = true;
-                if count <= 3 {
-                    third_end = at + 1;
-                }
-                // "nan" and "inf" parse as numbers; no other number has an n.
-                suspicious |= b | 0x20 == b'n';
-            }
-        }
+    // The common case in one pass without branches: words, and bytes that need a closer look. "nan" and "inf"
+    // parse as numbers, and no other number has an n.
+    let (mut count, mut was_space, mut unusual) = (0, true, false);
+    for &byte in &*numbers {
+        let space = is_space(byte);
+        count += usize::from(was_space & !space);
+        was_space = space;
+        unusual |= (byte == b'#') | (byte | 0x20 == b'n');
     }
-    if suspicious {
-        let word = numbers.split(|&b| is_space(b)).find(|word| word.iter().any(|b| b | 0x20 == b'n'));
-        let word = String::from_utf8_lossy(word.unwrap_or_default()).into_owned();
-        return Err(match word.parse::<f32>() {
-            Ok(_) => ObjFault::NotFinite(word),
-            Err(_) => ObjFault::Number(word),
-        });
+    if count == 3 && !unusual {
+        return Ok(());
+    }
+    if unusual {
+        count = count_words(numbers);
+        if let Some(word) = words(numbers).find(|word| word.iter().any(|b| b | 0x20 == b'n')) {
+            let word = first_word(word);
+            return Err(match word.parse::<f32>() {
+                Ok(_) => ObjFault::NotFinite(word),
+                Err(_) => ObjFault::Number(word),
+            });
+        }
     }
     match count {
         3 | 4 => Ok(()),
         6.. => {
-            numbers[third_end..].fill(b' ');
+            let (mut word, mut was_space) = (0, true);
+            for byte in numbers {
+                word += usize::from(was_space && !is_space(*byte));
+                was_space = is_space(*byte);
+                if word > 3 {
+                    *byte = b' ';
+                }
+            }
             Ok(())
         }
         found => {
@@ -195,6 +211,11 @@ fn check_position(numbers: &mut [u8]) -> Result<(), ObjFault> {
             Err(ObjFault::Count { keyword: "v", expected, found })
         }
     }
+}
+
+/// Words between white space.
+fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
+    text.split(|&b| is_space(b)).filter(|word| !word.is_empty())
 }
 
 /// Counts words before a comment, and blanks the comment.
@@ -220,14 +241,14 @@ fn count_words(text: &mut [u8]) -> usize {
 pub(super) fn locate(text: &[u8]) -> Option<FaultAt> {
     let mut line = 1;
     for statement in text.split(|&b| b == b'\n') {
-        let mut words = statement.split(|&b| is_space(b)).filter(|word| !word.is_empty());
-        let needed = match words.next() {
+        let mut statement_words = words(statement);
+        let needed = match statement_words.next() {
             Some(b"v") => 4,
             Some(b"vt") => 2,
             Some(b"vn") => 3,
             _ => 0,
         };
-        for (i, word) in words.take(needed).enumerate() {
+        for (i, word) in statement_words.take(needed).enumerate() {
             let word = String::from_utf8_lossy(word).into_owned();
             match word.parse::<f32>() {
                 Err(_) => return Some((line, ObjFault::Number(word))),
@@ -238,7 +259,7 @@ pub(super) fn locate(text: &[u8]) -> Option<FaultAt> {
                 Ok(_) => {}
             }
         }
-        line += 1 + statement.iter().filter(|&&b| b == CONTINUED).count();
+        line += 1 + count(CONTINUED, statement);
     }
     None
 }
@@ -248,21 +269,25 @@ pub(super) fn line_of_face(text: &[u8], face: usize) -> usize {
     let mut line = 1;
     let mut faces = 0;
     for statement in text.split(|&b| b == b'\n') {
-        let mut words = statement.split(|&b| is_space(b)).filter(|word| !word.is_empty());
-        if words.next() == Some(b"f") {
+        let mut statement_words = words(statement);
+        if statement_words.next() == Some(b"f") {
             if faces == face {
                 break;
             }
             faces += 1;
         }
-        line += 1 + statement.iter().filter(|&&b| b == CONTINUED).count();
+        line += 1 + count(CONTINUED, statement);
     }
     line
 }
 
 /// The line of a byte, from 1.
 fn line_of(text: &[u8], at: usize) -> usize {
-    1 + text[..at].iter().filter(|&&b| b == b'\n').count()
+    1 + count(b'\n', &text[..at])
+}
+
+fn count(byte: u8, text: &[u8]) -> usize {
+    memchr::memchr_iter(byte, text).count()
 }
 
 /// White space as `tobj` sees it, within ASCII.
@@ -277,26 +302,25 @@ fn first_word(text: &[u8]) -> String {
 }
 
 fn replace(text: &mut [u8], from: u8, to: u8) {
-    if text.contains(&from) {
+    if memchr(from, text).is_some() {
         text.iter_mut().filter(|b| **b == from).for_each(|b| *b = to);
     }
 }
 
-/// A backslash at the end of a line continues it on the next.
-fn join_continued_lines(text: &mut [u8]) {
-    if !text.contains(&b'\\') {
-        return;
-    }
-    for at in 0..text.len() {
-        if text[at] != b'\\' {
-            continue;
-        }
+/// A backslash at the end of a line continues it on the next. Returns whether there is one.
+fn join_continued_lines(text: &mut [u8]) -> bool {
+    let mut joined = false;
+    let mut from = 0;
+    while let Some(at) = memchr(b'\\', &text[from..]).map(|n| from + n) {
         let feed = if text.get(at + 1) == Some(&b'\r') { at + 2 } else { at + 1 };
         if text.get(feed) == Some(&b'\n') {
             text[at..feed].fill(b' ');
             text[feed] = CONTINUED;
+            joined = true;
         }
+        from = at + 1;
     }
+    joined
 }
 
 /// Keeps what is not ASCII in names, if it is UTF-8, and replaces it by '?' elsewhere; a number that held it

@@ -63,19 +63,27 @@ impl Strata {
         view.points(&squares[..pending], points);
     }
 
-    /// Calls `visit` with the lower corner and the size of every cell.
+    /// Calls `visit` with the lower corner and the size of every cell, band by band and column by column: so
+    /// a batch of points stays together on the light, and its rays in a narrow shaft.
     #[inline]
     fn for_each_cell(&self, mut visit: impl FnMut(Vec2, Vec2)) {
+        // The first rows are the long ones, by one cell.
         let (short, long_rows) = (self.cells / self.rows, self.cells % self.rows);
-        let mut before = 0;
-        for row in 0..self.rows {
-            let columns = short + u32::from(row < long_rows);
-            let y = before as f32 / self.cells as f32;
-            let size = Vec2::new(1.0 / columns as f32, columns as f32 / self.cells as f32);
-            for column in 0..columns {
-                visit(Vec2::new(column as f32 * size.x, y), size);
+        let size = |columns: u32| Vec2::new(1.0 / columns as f32, columns as f32 / self.cells as f32);
+        let sizes = [size(short), size(short + 1)];
+        let band = if self.per_cell == 1 { 8 } else { 6 };
+        for first in (0..self.rows).step_by(band) {
+            let rows = first..(first + band as u32).min(self.rows);
+            for column in 0..=short {
+                for row in rows.clone() {
+                    let is_long = row < long_rows;
+                    if column < short || is_long {
+                        let size = sizes[usize::from(is_long)];
+                        let before = row * short + row.min(long_rows);
+                        visit(Vec2::new(column as f32 * size.x, before as f32 / self.cells as f32), size);
+                    }
+                }
             }
-            before += columns;
         }
     }
 }
@@ -87,6 +95,7 @@ mod tests {
     fn cells(strata: Strata) -> Vec<(Vec2, Vec2)> {
         let mut cells = Vec::new();
         strata.for_each_cell(|corner, size| cells.push((corner, size)));
+        assert_eq!(cells.len(), strata.cells as usize);
         cells
     }
 
@@ -94,13 +103,14 @@ mod tests {
     fn cells_are_equal_disjoint_and_fill_the_square() {
         for count in (1..200).chain([251, 256, 997, 1024]) {
             for aspect in [1.0, 4.0, 0.01, f32::NAN, f32::INFINITY, -1.0] {
-                let cells = cells(Strata::new(count, aspect));
+                let mut cells = cells(Strata::new(count, aspect));
                 assert_eq!(cells.len(), count as usize);
                 for &(corner, size) in &cells {
                     assert!((size.x * size.y * count as f32 - 1.0).abs() < 1e-5);
                     assert!((corner + size).max_element() < 1.0 + 1e-6);
                 }
-                // In every pair the later cell starts where the earlier one ends, in its row or above it.
+                // Row by row, every cell starts where the one before ends, in its row or above it.
+                cells.sort_by(|(a, _), (b, _)| (a.y, a.x).partial_cmp(&(b.y, b.x)).unwrap());
                 for pair in cells.windows(2) {
                     let ((a, size), (b, _)) = (pair[0], pair[1]);
                     let beside = b.y == a.y && (b.x - a.x - size.x).abs() < 1e-6;
@@ -120,6 +130,22 @@ mod tests {
             }
         }
         assert_eq!(Strata::new(256, 1.0).rows, 16);
+    }
+
+    /// Points that are traced together lie in a patch that is not much longer than wide.
+    #[test]
+    fn batches_are_compact() {
+        for (count, pairs) in [(1024, false), (512, true), (4096, true)] {
+            let strata = if pairs { Strata::paired(2 * count, 1.0) } else { Strata::new(count, 1.0) };
+            let batch = BATCH / strata.per_cell as usize;
+            let area = batch as f32 / count as f32;
+            for cells in cells(strata).chunks_exact(batch).take(4) {
+                let min = cells.iter().fold(Vec2::INFINITY, |m, (corner, _)| m.min(*corner));
+                let max = cells.iter().fold(Vec2::NEG_INFINITY, |m, (corner, size)| m.max(*corner + *size));
+                let side = (max - min).max_element();
+                assert!(side < 1.5 * area.sqrt(), "{count}: {side} for {area}");
+            }
+        }
     }
 
     #[test]

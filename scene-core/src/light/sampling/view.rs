@@ -82,7 +82,7 @@ impl LightView {
         match self.0 {
             Shape::Single(point) => map(squares, points, |_| point),
             Shape::Parallelogram { corner, edge_u, edge_v } => {
-                map(squares, points, |square| LightPoint::At(corner + edge_u * square.x + edge_v * square.y))
+                map(squares, points, |square| LightPoint::At(corner + edge_u * square.x + edge_v * square.y));
             }
             Shape::Disk { center, axis_u, axis_v } => map(squares, points, |square| {
                 let (disk, _) = concentric(square);

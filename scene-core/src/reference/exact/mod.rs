@@ -39,7 +39,7 @@ pub enum ExactError {
 }
 
 /// V of `light` for every pixel of `gbuffer` that sees a surface, with `std_error` 0 and by the same rules as
-/// [`reference`]; `casters` must be those of `scene`.
+/// [`reference()`]; `casters` must be those of `scene`.
 ///
 /// # Errors
 /// A light or caster that cannot be done exactly, or [`Cancelled`] if `progress` breaks.
