@@ -4,8 +4,10 @@
 
 mod ci;
 mod docs;
+mod shaders;
 mod shell;
 mod tidy;
+mod vulkan;
 
 use std::process::ExitCode;
 
@@ -25,6 +27,8 @@ enum Command {
     Ci,
     /// Project rules that no compiler knows: file lengths, sister files of the technique crates, leftovers.
     Tidy,
+    /// Links, validates and translates every shader, and holds it against the project's rules.
+    Shaders,
     /// Builds the documentation with and without the feature `gpu`; a warning is a failure.
     Docs,
 }
@@ -33,6 +37,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Ci => ci::run(),
         Command::Tidy => tidy::run(),
+        Command::Shaders => shaders::run(),
         Command::Docs => docs::run(),
     };
     match result {

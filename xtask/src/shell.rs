@@ -31,6 +31,9 @@ pub(crate) enum CheckError {
     /// Project rules are broken, one a line.
     #[error("{} project rules broken:\n{}", .0.len(), .0.join("\n"))]
     Rules(Vec<String>),
+    /// Shaders are broken, one fault a line.
+    #[error("{} faults in shaders:\n{}", .0.len(), .0.join("\n"))]
+    Shaders(Vec<String>),
 }
 
 /// The workspace's folder.

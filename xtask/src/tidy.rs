@@ -49,7 +49,7 @@ pub(crate) fn run() -> Result<(), CheckError> {
 }
 
 /// Source files below `folder`, build output left out.
-fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), CheckError> {
+pub(crate) fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), CheckError> {
     let fail = |source| CheckError::Read { path: folder.to_owned(), source };
     for entry in fs::read_dir(folder).map_err(fail)? {
         let path = entry.map_err(fail)?.path();

@@ -1,68 +1,48 @@
-//! The GPU half of the interface: techniques record into the caller's encoder and write the caller's view.
+//! The GPU half: techniques record into the caller's encoder and write the caller's view.
 //!
-//! Nothing here creates a device, submits work or reads back: a technique lives inside somebody else's frame.
-//! Textures and buffers are the caller's; their formats are stated per field.
+//! | module | what it holds |
+//! | --- | --- |
+//! | [`technique`] | the trait's GPU half and what techniques are given |
+//! | [`scene`] | geometry in buffers, its upload and bind groups |
+//! | [`gbuffer`] | the G-buffer pass |
+//! | [`depth`] | the shadow-depth pass |
+//! | [`layout`] | uniforms of cameras and lights |
+//! | [`timing`] | the recorder, time per stage |
+//! | [`shaders`] | the linked WGSL |
+//! | [`adapter`], [`readback`], [`headless`] | a device without a window, reading back, a whole frame |
+//! | [`testing`] | a device for tests, a runner for shader functions |
+//!
+//! # In somebody else's frame
+//! Nothing but the three headless modules creates a device, submits work, waits or reads back. A technique lives in
+//! a renderer's own frame: device, encoder, depth pre-pass and lighting pass are the renderer's, textures and
+//! buffers too, and their formats are stated per field. Everything fits WebGPU's default limits and asks for no
+//! feature; timestamps are used where the device has them.
+//!
+//! # Shared WGSL
+//! `shaders/*.wesl` of this crate are WESL modules: `scene_core::camera`, `light`, `sampling`, `gbuffer`, `scene`
+//! and `cutout` are imported by technique crates at build time (crate `gnomon-shader-build` says how and why). Bind
+//! groups have fixed places: 0 is the pass's own, 1 the scene's triangles, 2 its cut-outs.
 
-use crate::technique::TechniqueError;
-use crate::{Camera, Light, Report};
+pub mod adapter;
+pub mod depth;
+mod error;
+pub mod gbuffer;
+pub mod headless;
+pub mod layout;
+mod pipeline;
+pub mod readback;
+pub mod scene;
+pub mod shaders;
+pub mod technique;
+pub mod testing;
+pub mod timing;
 
-/// A scene in the caller's buffers, world space, as [`Scene`](crate::Scene) holds it.
-#[derive(Clone, Copy, Debug)]
-pub struct GpuScene<'a> {
-    /// Vertex positions: three tightly packed f32 each. Usages `VERTEX | STORAGE`.
-    pub positions: &'a wgpu::Buffer,
-    /// Triangles: three u32 each. Usages `INDEX | STORAGE`.
-    pub triangles: &'a wgpu::Buffer,
-    /// How many triangles there are.
-    pub triangle_count: u32,
-}
-
-/// What the camera sees, in the caller's textures, all of the same size.
-#[derive(Clone, Copy, Debug)]
-pub struct GpuGBuffer<'a> {
-    /// Pixels a row and rows.
-    pub size: [u32; 2],
-    /// `Depth32Float`, reversed Z by [`Camera::projection_from_view`]; 0 where nothing is seen.
-    pub depth: &'a wgpu::TextureView,
-    /// `Rgba32Float` or `Rgba16Float`: unit geometric normal in world space, turned to the camera.
-    pub normal: &'a wgpu::TextureView,
-    /// `R32Uint`: object id.
-    pub object: &'a wgpu::TextureView,
-}
-
-/// [`ShadowQuery`](crate::technique::ShadowQuery) on the GPU.
-#[derive(Clone, Copy, Debug)]
-pub struct GpuShadowQuery<'a> {
-    /// Geometry.
-    pub scene: GpuScene<'a>,
-    /// The light whose visibility is asked for.
-    pub light: &'a Light,
-    /// The camera that the G-buffer is seen by.
-    pub camera: &'a Camera,
-}
-
-/// A technique on one device: its pipelines and the textures it keeps between frames. Made by
-/// [`ShadowTechnique::gpu`](crate::ShadowTechnique::gpu).
-pub trait GpuShadowTechnique: Send {
-    /// Records what depends on scene and light (and, for view-dependent techniques, on the camera).
-    ///
-    /// # Errors
-    /// [`TechniqueError::Unsupported`] for inputs that the technique excludes.
-    fn prepare(
-        &mut self,
-        encoder: &mut wgpu::CommandEncoder,
-        query: &GpuShadowQuery<'_>,
-    ) -> Result<Report, TechniqueError>;
-
-    /// Records the pass that writes V of every pixel to `visibility` (`R32Float` or `R8Unorm`, usage
-    /// `RENDER_ATTACHMENT`).
-    ///
-    /// # Errors
-    /// If nothing was prepared.
-    fn shade(
-        &mut self,
-        encoder: &mut wgpu::CommandEncoder,
-        gbuffer: &GpuGBuffer<'_>,
-        visibility: &wgpu::TextureView,
-    ) -> Result<Report, TechniqueError>;
-}
+pub use adapter::Gpu;
+pub use depth::{DepthIds, DepthPass, DepthTarget};
+pub use error::GpuError;
+pub use gbuffer::{GBufferPass, GBufferTargets, GpuGBuffer};
+pub use headless::{HeadlessError, HeadlessFrame};
+pub use layout::{CameraUniform, DepthUniform, LightUniform};
+pub use scene::{GpuCutouts, GpuObject, GpuScene, SceneBuffers};
+pub use technique::{GpuShadowQuery, GpuShadowTechnique};
+pub use timing::{Recorder, StageSpan, StageTimer};

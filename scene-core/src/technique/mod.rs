@@ -75,7 +75,8 @@ pub trait ShadowTechnique: Send + Sync {
         query: &ShadowQuery<'a>,
     ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError>;
 
-    /// The technique on a device of the caller's: makes its pipelines, records nothing yet.
+    /// The technique on a device of the caller's: makes its pipelines, records nothing yet. `visibility` is the
+    /// format of the texture that it will write: `R32Float`, `R8Unorm` or any other that takes one float.
     ///
     /// # Errors
     /// [`TechniqueError::Unsupported`] if there is no GPU path for these settings.
@@ -83,9 +84,9 @@ pub trait ShadowTechnique: Send + Sync {
     fn gpu(
         &self,
         device: &wgpu::Device,
-        queue: &wgpu::Queue,
+        visibility: wgpu::TextureFormat,
     ) -> Result<Box<dyn crate::gpu::GpuShadowTechnique>, TechniqueError> {
-        let _ = (device, queue);
+        let _ = (device, visibility);
         Err(TechniqueError::Unsupported {
             technique: self.name(),
             input: "backend = gpu".to_owned(),

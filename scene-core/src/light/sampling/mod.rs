@@ -26,7 +26,7 @@ mod strata;
 mod view;
 
 pub use key::SampleKey;
-pub use sobol::sobol;
+pub use sobol::{sobol, sobol_of_seeds};
 pub use strata::Strata;
 pub use view::LightView;
 

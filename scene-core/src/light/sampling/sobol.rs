@@ -16,9 +16,16 @@ use super::key::unit;
 #[inline]
 pub fn sobol(index: u32, key: SampleKey) -> Vec2 {
     let seeds = key.bits(u32::MAX);
+    sobol_of_seeds(index, [(seeds >> 32) as u32, seeds as u32])
+}
+
+/// Point `index` of the sequence that is scrambled by these seeds, one a dimension: what shaders have, where a
+/// [`SampleKey`]'s 64 bits are not at hand.
+#[inline]
+pub fn sobol_of_seeds(index: u32, seeds: [u32; 2]) -> Vec2 {
     // In reversed bit order the first dimension, the bit reversal of the index, is the index itself.
-    let x = owen_scramble_reversed(index, (seeds >> 32) as u32).reverse_bits();
-    let y = owen_scramble_reversed(second_dimension_reversed(index), seeds as u32).reverse_bits();
+    let x = owen_scramble_reversed(index, seeds[0]).reverse_bits();
+    let y = owen_scramble_reversed(second_dimension_reversed(index), seeds[1]).reverse_bits();
     Vec2::new(unit(x), unit(y))
 }
 

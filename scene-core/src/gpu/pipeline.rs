@@ -1,0 +1,92 @@
+//! Pipelines and bind groups in the few shapes that the passes here need.
+
+/// A shader module from linked WGSL.
+pub(super) fn shader_module(device: &wgpu::Device, label: &str, wgsl: &str) -> wgpu::ShaderModule {
+    device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(label),
+        source: wgpu::ShaderSource::Wgsl(wgsl.into()),
+    })
+}
+
+/// A layout of one uniform buffer.
+pub(super) fn uniform_layout(device: &wgpu::Device, stages: wgpu::ShaderStages) -> wgpu::BindGroupLayout {
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("uniform"),
+        entries: &[wgpu::BindGroupLayoutEntry {
+            binding: 0,
+            visibility: stages,
+            ty: wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Uniform,
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        }],
+    })
+}
+
+/// The group of [`uniform_layout`].
+pub(super) fn uniform_group(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+    uniform: &wgpu::Buffer,
+) -> wgpu::BindGroup {
+    device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("uniform"),
+        layout,
+        entries: &[wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }],
+    })
+}
+
+/// What differs between render pipelines here: all draw triangle lists, both faces, nearest reversed depth first.
+pub(super) struct RenderPipelineParts<'a> {
+    pub(super) label: &'a str,
+    pub(super) module: &'a wgpu::ShaderModule,
+    pub(super) vertex: &'a str,
+    /// None draws depth only.
+    pub(super) fragment: Option<&'a str>,
+    pub(super) groups: &'a [&'a wgpu::BindGroupLayout],
+    pub(super) vertex_buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
+    pub(super) targets: &'a [wgpu::TextureFormat],
+    pub(super) cull: Option<wgpu::Face>,
+}
+
+pub(super) fn render_pipeline(
+    device: &wgpu::Device,
+    parts: &RenderPipelineParts<'_>,
+) -> wgpu::RenderPipeline {
+    let groups: Vec<_> = parts.groups.iter().copied().map(Some).collect();
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(parts.label),
+        bind_group_layouts: &groups,
+        immediate_size: 0,
+    });
+    let targets: Vec<_> = parts.targets.iter().map(|&format| Some(format.into())).collect();
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(parts.label),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: parts.module,
+            entry_point: Some(parts.vertex),
+            compilation_options: Default::default(),
+            buffers: parts.vertex_buffers,
+        },
+        primitive: wgpu::PrimitiveState { cull_mode: parts.cull, ..Default::default() },
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: wgpu::TextureFormat::Depth32Float,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Greater),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
+        multisample: Default::default(),
+        fragment: parts.fragment.map(|entry_point| wgpu::FragmentState {
+            module: parts.module,
+            entry_point: Some(entry_point),
+            compilation_options: Default::default(),
+            targets: &targets,
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}

@@ -1,0 +1,259 @@
+//! The scene on the GPU: what techniques are given, and the upload of a [`Scene`].
+
+use std::ops::Range;
+
+use wgpu::util::DeviceExt as _;
+
+use super::GpuError;
+use crate::Scene;
+use crate::geometry::{Aabb, AlphaMask, ObjectFlags, Wrap};
+
+/// An object of a [`GpuScene`]; its id is its place there, as in [`Scene::objects`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct GpuObject {
+    /// Its triangles.
+    pub triangles: Range<u32>,
+    /// World-space bounds of its vertices.
+    pub bounds: Aabb,
+    /// What it takes part in.
+    pub flags: ObjectFlags,
+    /// Whether it has a cut-out mask, in [`GpuScene::cutouts`].
+    pub has_mask: bool,
+}
+
+/// A scene in the caller's buffers, world space, as [`Scene`] holds it.
+#[derive(Clone, Copy, Debug)]
+pub struct GpuScene<'a> {
+    /// Vertex positions: three tightly packed f32 each. Usages `VERTEX | STORAGE`.
+    pub positions: &'a wgpu::Buffer,
+    /// Triangles: three u32 each. Usages `INDEX | STORAGE`.
+    pub triangles: &'a wgpu::Buffer,
+    /// Objects; their triangles do not overlap. An object without triangles is allowed.
+    pub objects: &'a [GpuObject],
+    /// Bounds of all objects, world space.
+    pub bounds: Aabb,
+    /// Cut-out masks, where any object has one.
+    pub cutouts: Option<GpuCutouts<'a>>,
+    /// The same geometry in memory, for techniques that build topology or hierarchies from it. Without it those
+    /// answer [`TechniqueError::Unsupported`](crate::technique::TechniqueError::Unsupported).
+    pub geometry: Option<&'a Scene>,
+}
+
+/// Cut-out masks of a [`GpuScene`].
+#[derive(Clone, Copy, Debug)]
+pub struct GpuCutouts<'a> {
+    /// Texture coordinates: two f32 a vertex. Usage `STORAGE`.
+    pub uvs: &'a wgpu::Buffer,
+    /// Masks, as `cutout.wesl` reads them; see [`mask_words`]. Usage `STORAGE`.
+    pub masks: &'a wgpu::Buffer,
+}
+
+impl GpuScene<'_> {
+    /// How many triangles there are.
+    pub fn triangle_count(&self) -> u32 {
+        self.objects.iter().map(|object| object.triangles.end).max().unwrap_or(0)
+    }
+}
+
+/// A [`Scene`] uploaded: owns the buffers that a [`GpuScene`] borrows.
+#[derive(Debug)]
+pub struct SceneBuffers {
+    positions: wgpu::Buffer,
+    triangles: wgpu::Buffer,
+    cutouts: Option<[wgpu::Buffer; 2]>,
+    objects: Vec<GpuObject>,
+    bounds: Aabb,
+}
+
+impl SceneBuffers {
+    /// Copies `scene` to `device`.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] if an array is larger than the device binds in one piece.
+    pub fn new(device: &wgpu::Device, scene: &Scene) -> Result<Self, GpuError> {
+        let buffer = |what: &'static str, bytes: &[u8], usage| {
+            let limits = device.limits();
+            let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+            if bytes.len() as u64 > limit {
+                return Err(GpuError::TooLarge { what, bytes: bytes.len() as u64, limit });
+            }
+            // A binding must not be empty: an empty scene has one vertex and one triangle that nobody draws.
+            let contents = if bytes.is_empty() { &[0; 12] } else { bytes };
+            let usage = usage | wgpu::BufferUsages::STORAGE;
+            Ok(device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(what),
+                contents,
+                usage,
+            }))
+        };
+        let positions =
+            buffer("vertex positions", bytemuck::cast_slice(scene.positions()), wgpu::BufferUsages::VERTEX)?;
+        let triangles =
+            buffer("triangles", bytemuck::cast_slice(scene.triangles()), wgpu::BufferUsages::INDEX)?;
+        let none = wgpu::BufferUsages::empty();
+        let cutouts = if scene.has_alpha() {
+            let masks: Vec<_> = scene.objects().iter().map(|object| object.alpha.as_deref()).collect();
+            Some([
+                buffer("texture coordinates", bytemuck::cast_slice(scene.uvs()), none)?,
+                buffer("cut-out masks", bytemuck::cast_slice(&mask_words(&masks)), none)?,
+            ])
+        } else {
+            None
+        };
+        let objects = scene.objects().iter().map(|object| GpuObject {
+            // A scene's indices fit 32 bits.
+            triangles: object.triangles.start as u32..object.triangles.end as u32,
+            bounds: object.bounds,
+            flags: object.flags,
+            has_mask: object.alpha.is_some(),
+        });
+        Ok(Self { positions, triangles, cutouts, objects: objects.collect(), bounds: scene.bounds() })
+    }
+
+    /// What techniques are given. `geometry` is the scene this was made from, if it is still there.
+    pub fn view<'a>(&'a self, geometry: Option<&'a Scene>) -> GpuScene<'a> {
+        GpuScene {
+            positions: &self.positions,
+            triangles: &self.triangles,
+            objects: &self.objects,
+            bounds: self.bounds,
+            cutouts: self.cutouts.as_ref().map(|[uvs, masks]| GpuCutouts { uvs, masks }),
+            geometry,
+        }
+    }
+
+    /// Bytes held on the device.
+    pub fn bytes(&self) -> u64 {
+        let cutouts = self.cutouts.iter().flatten().map(wgpu::Buffer::size).sum::<u64>();
+        self.positions.size() + self.triangles.size() + cutouts
+    }
+}
+
+/// The words of [`GpuCutouts::masks`] for objects with these masks.
+///
+/// One word an object says where its mask starts, `u32::MAX` for none. A mask is four words (width, height, wrap
+/// of u and of v: 0 repeat, 1 mirror, 2 clamp) and one bit a texel, row by row, the lowest bit of a word first.
+pub fn mask_words(masks: &[Option<&AlphaMask>]) -> Vec<u32> {
+    let mut words = vec![u32::MAX; masks.len()];
+    // Objects that share a mask share its words.
+    let mut known: Vec<(&AlphaMask, u32)> = Vec::new();
+    for (object, mask) in masks.iter().enumerate() {
+        let Some(mask) = *mask else { continue };
+        if let Some((_, start)) = known.iter().find(|(other, _)| std::ptr::eq(*other, mask)) {
+            words[object] = *start;
+            continue;
+        }
+        let start = words.len() as u32;
+        known.push((mask, start));
+        words[object] = start;
+        let wrap = mask.wrap().map(|wrap| match wrap {
+            Wrap::Repeat => 0,
+            Wrap::Mirror => 1,
+            Wrap::Clamp => 2,
+        });
+        words.extend([mask.width(), mask.height(), wrap[0], wrap[1]]);
+        let bits = mask.texels().chunks(32).map(|texels| {
+            texels.iter().zip(0..).fold(0u32, |word, (&solid, bit)| word | u32::from(solid) << bit)
+        });
+        words.extend(bits);
+    }
+    words
+}
+
+/// Bind group layouts of a [`GpuScene`], and the groups of the scene last used: group 1 is its triangles, group
+/// 2 its cut-outs, in every shader (`scene.wesl`, `cutout.wesl`).
+#[derive(Debug)]
+pub struct SceneBindings {
+    /// Group 1: positions, triangles.
+    pub triangles_layout: wgpu::BindGroupLayout,
+    /// Group 2: texture coordinates, masks.
+    pub cutouts_layout: wgpu::BindGroupLayout,
+    held: Option<HeldGroups>,
+}
+
+#[derive(Debug)]
+struct HeldGroups {
+    buffers: [Option<wgpu::Buffer>; 4],
+    groups: SceneGroups,
+}
+
+/// The bind groups of one scene.
+#[derive(Clone, Debug)]
+pub struct SceneGroups {
+    /// Group 1.
+    pub triangles: wgpu::BindGroup,
+    /// Group 2, where there are cut-outs.
+    pub cutouts: Option<wgpu::BindGroup>,
+}
+
+impl SceneBindings {
+    /// Layouts that `stages` may read.
+    pub fn new(device: &wgpu::Device, stages: wgpu::ShaderStages) -> Self {
+        let layout = |label| {
+            let entry = |binding| wgpu::BindGroupLayoutEntry {
+                binding,
+                visibility: stages,
+                ty: wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Storage { read_only: true },
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                count: None,
+            };
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(label),
+                entries: &[entry(0), entry(1)],
+            })
+        };
+        Self { triangles_layout: layout("triangles"), cutouts_layout: layout("cut-outs"), held: None }
+    }
+
+    /// The groups of `scene`; made anew only if its buffers are others than last time.
+    pub fn groups(&mut self, device: &wgpu::Device, scene: &GpuScene<'_>) -> SceneGroups {
+        let cutouts = scene.cutouts;
+        let buffers = [
+            Some(scene.positions.clone()),
+            Some(scene.triangles.clone()),
+            cutouts.map(|cutouts| cutouts.uvs.clone()),
+            cutouts.map(|cutouts| cutouts.masks.clone()),
+        ];
+        if let Some(held) = self.held.as_ref().filter(|held| held.buffers == buffers) {
+            return held.groups.clone();
+        }
+        let group = |layout, buffers: [&wgpu::Buffer; 2]| {
+            let entry = |binding| wgpu::BindGroupEntry {
+                binding,
+                resource: buffers[binding as usize].as_entire_binding(),
+            };
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("scene"),
+                layout,
+                entries: &[entry(0), entry(1)],
+            })
+        };
+        let groups = SceneGroups {
+            triangles: group(&self.triangles_layout, [scene.positions, scene.triangles]),
+            cutouts: cutouts.map(|cutouts| group(&self.cutouts_layout, [cutouts.uvs, cutouts.masks])),
+        };
+        self.held = Some(HeldGroups { buffers, groups: groups.clone() });
+        groups
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn masks_are_packed_and_shared() {
+        let alpha: Vec<u8> = (0..40).map(|i| if i % 3 == 0 { 255 } else { 0 }).collect();
+        let mask = AlphaMask::from_alpha(8, 5, &alpha, 0.5, [Wrap::Mirror, Wrap::Clamp]).unwrap();
+        let words = mask_words(&[None, Some(&mask), Some(&mask)]);
+        assert_eq!(words[..7], [u32::MAX, 3, 3, 8, 5, 1, 2]);
+        assert_eq!(words.len(), 9);
+        for (texel, &solid) in mask.texels().iter().enumerate() {
+            assert_eq!(words[7 + texel / 32] >> (texel % 32) & 1 == 1, solid);
+        }
+        assert!(mask_words(&[]).is_empty());
+    }
+}

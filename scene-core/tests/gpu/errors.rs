@@ -1,0 +1,95 @@
+//! Faults of devices are errors, not panics.
+
+use gnomon_scene_core::Scene;
+use gnomon_scene_core::gpu::{Gpu, GpuError, SceneBuffers, testing};
+
+fn texture(gpu: &Gpu, side: u32, layers: u32) -> Result<wgpu::Texture, GpuError> {
+    gpu.scoped("a texture", || {
+        gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: layers },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba32Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        })
+    })
+}
+
+#[test]
+fn a_texture_beyond_the_limits_is_an_error() {
+    let Some(gpu) = testing::gpu() else { return };
+    let error = texture(&gpu, 1 << 20, 1).unwrap_err();
+    assert!(matches!(&error, GpuError::Validation { what, .. } if what == "a texture"), "{error}");
+    // The device goes on.
+    assert!(texture(&gpu, 16, 1).is_ok() && gpu.check().is_ok());
+}
+
+#[test]
+fn memory_that_is_not_there_is_an_error() {
+    let Some(gpu) = testing::gpu() else { return };
+    let limits = gpu.device.limits();
+    // Within the limits, and terabytes on most adapters; one that has as much proves nothing here.
+    let result = texture(&gpu, limits.max_texture_dimension_2d, limits.max_texture_array_layers);
+    if let Err(error) = result {
+        assert!(matches!(error, GpuError::OutOfMemory { .. }), "{error}");
+    }
+    assert!(texture(&gpu, 16, 1).is_ok());
+}
+
+#[test]
+fn a_lost_device_says_so_from_then_on() {
+    let Some(gpu) = testing::gpu() else { return };
+    gpu.check().unwrap();
+    gpu.device.destroy();
+    // The loss is told when the device is polled.
+    let _ = gpu.device.poll(wgpu::PollType::Poll);
+    assert!(matches!(gpu.check(), Err(GpuError::Lost { .. })), "{:?}", gpu.check());
+    assert!(matches!(texture(&gpu, 16, 1), Err(GpuError::Lost { .. })));
+    assert!(matches!(gpu.wait(), Err(GpuError::Lost { .. })));
+}
+
+#[test]
+fn faults_outside_of_scopes_are_kept() {
+    let Some(gpu) = testing::gpu() else { return };
+    let too_large = gpu.device.limits().max_buffer_size + 4;
+    let _ = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: too_large,
+        usage: wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    assert!(gpu.check().is_err());
+}
+
+#[test]
+fn an_adapter_that_is_not_there_is_named() {
+    if testing::gpu().is_none() {
+        return;
+    }
+    let error = Gpu::open_adapter(Some("no adapter has this name")).unwrap_err();
+    assert!(error.is_missing() && error.to_string().contains("no adapter has this name"), "{error}");
+}
+
+#[test]
+fn an_array_too_large_to_bind_is_refused_before_it_is_made() {
+    let Some(gpu) = testing::gpu() else { return };
+    // A device that binds less than the scene needs: WebGPU's smallest, and a scene just above it.
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+    let adapter = adapters.iter().find(|a| a.get_info().name == gpu.adapter.name).unwrap();
+    let limits = wgpu::Limits { max_storage_buffer_binding_size: 1 << 12, ..wgpu::Limits::default() };
+    let (device, _) = pollster::block_on(
+        adapter.request_device(&wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() }),
+    )
+    .unwrap();
+    let mut scene = Scene::new();
+    let corners = vec![glam::Vec3::ZERO; 3];
+    let mesh = gnomon_scene_core::TriangleMesh::new("many", corners, vec![[0, 1, 2]; 400]);
+    scene.add(&mesh, glam::Affine3A::IDENTITY, Default::default()).unwrap();
+    let error = SceneBuffers::new(&device, &scene).unwrap_err();
+    assert_eq!(error, GpuError::TooLarge { what: "triangles", bytes: 4800, limit: 4096 });
+    assert!(SceneBuffers::new(&gpu.device, &scene).is_ok());
+}
