@@ -245,3 +245,50 @@ fn may_cross(lo: Vec3, hi: Vec3, direction: Vec3) -> bool {
     // Quotients are rounded by at most 2⁻⁵³ of themselves each.
     near <= far * (1.0 + 4.0 * f64::EPSILON)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{ObjectFlags, Scene, TriangleMesh};
+    use fearless_simd::Level;
+    use glam::Affine3A;
+
+    /// Points of [−1, 1]³ by golden-ratio steps.
+    fn point(i: u32) -> Vec3 {
+        let at = |step: f64| ((f64::from(i) * step).fract() * 2.0 - 1.0) as f32;
+        Vec3::new(at(0.819_172_513), at(0.671_043_607), at(0.549_700_478))
+    }
+
+    #[test]
+    fn every_vector_unit_gives_the_same_answers() {
+        let positions: Vec<_> = (0..900).map(|i| point(i / 3 * 7) + point(i + 5000) * 0.2).collect();
+        let triangles = (0..300).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let mut scene = Scene::new();
+        let mesh = TriangleMesh::new("soup", positions, triangles);
+        scene.add(&mesh, Affine3A::IDENTITY, ObjectFlags::default()).unwrap();
+        let best = Bvh::all(&scene);
+        let mut others = vec![Level::baseline()];
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        {
+            others.extend(best.level.as_sse4_2().map(Level::Sse4_2));
+            others.extend(best.level.as_avx2().map(Level::Avx2));
+        }
+        for level in others {
+            let other = Bvh { level, ..best.clone() };
+            for packet in 0..300 {
+                let origin = point(packet + 20_000) * 1.5;
+                let count = [1, 5, 16, 64][packet as usize % 4];
+                let targets: Vec<_> =
+                    (0..count).map(|i| LightPoint::At(point(packet * 64 + i) * 2.0)).collect();
+                let blocked = best.occluded_mask(origin, &targets);
+                assert_eq!(blocked, other.occluded_mask(origin, &targets));
+                let direction = point(packet + 40_000);
+                let hit = |bvh: &Bvh| bvh.closest_hit(origin, direction, 0.0, f32::INFINITY);
+                assert_eq!(hit(&best), hit(&other));
+                // The exact walk that knows no vectors agrees as well.
+                let ends = [0, 1, 2].map(|axis| [(point(packet * 64) * 2.0 - origin)[axis]]);
+                assert_eq!(blocked & 1, other.occluded_slowly(origin, &ends, 1, true));
+            }
+        }
+    }
+}

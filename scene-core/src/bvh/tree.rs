@@ -233,8 +233,9 @@ impl<'a> Collapse<'a> {
         // Binary node, wide node, depth of the wide node.
         let mut pending = vec![(0_usize, 0_usize, 1_usize)];
         while let Some((from, to, depth)) = pending.pop() {
-            // Each level leaves at most seven siblings behind.
-            tree.stack = tree.stack.max(depth * (WIDTH - 1) + 1);
+            // Each level leaves at most seven siblings behind; one entry more is written before it is known
+            // whether it counts.
+            tree.stack = tree.stack.max(depth * (WIDTH - 1) + 2);
             let children = self.children_of(from);
             let mut node = empty.clone();
             node.count = children.len() as u32;

@@ -54,6 +54,7 @@ pub(super) fn occluded<S: Simd, C: Cutout, const N: usize>(
     let lanes = ShaftLanes::new(simd, shaft);
     let mut alive = rays.mask;
     let mut spans = [[0.0; WIDTH]; 4];
+    let mut met_leaves = [(Link::NONE, 0_u64); WIDTH];
     // Two plain arrays, as filling one of pairs takes longer than many a walk; and no closure around the walk,
     // as it would not be inlined, and what is not inlined does not use the vector unit.
     let (mut inline_links, mut inline_masks) = ([Link::NONE; INLINE_STACK], [0_u64; INLINE_STACK]);
@@ -79,28 +80,30 @@ pub(super) fn occluded<S: Simd, C: Cutout, const N: usize>(
         } else {
             lanes.children::<true>(node, &mut spans)
         };
+        // Whether a ray meets a child cannot be foreseen, so the two loops that find out do not branch on it.
         let mut inner = hit & !node.leaves;
         while inner != 0 {
             let child = inner.trailing_zeros() as usize;
             inner &= inner - 1;
             let through = if N == 1 { through } else { rays.within(simd, &spans, child, through) };
-            if through != 0 {
-                (links[height], masks[height]) = (node.links[child], through);
-                height += 1;
-            }
+            (links[height], masks[height]) = (node.links[child], through);
+            height += usize::from(through != 0);
         }
-        // Leaves at once: what they block need not go on, and the processor foresees two plain loops better
-        // than one that does either.
         let mut leaves = hit & node.leaves;
+        let mut met = 0;
         while leaves != 0 {
             let child = leaves.trailing_zeros() as usize;
             leaves &= leaves - 1;
-            let through = through & alive;
             let through = if N == 1 { through } else { rays.within(simd, &spans, child, through) };
+            met_leaves[met % WIDTH] = (node.links[child], through);
+            met += usize::from(through != 0);
+        }
+        // Leaves at once: what they block need not go on.
+        for &(link, through) in met_leaves.iter().take(met) {
+            let through = through & alive;
             if through == 0 {
                 continue;
             }
-            let link = node.links[child];
             let block = &tree.blocks[link.index()];
             let Some(found) = cull(simd, shaft, &lanes, block, link.count()) else { continue };
             let masked = cutout.map_or(0, |c| c.lanes(link.index()));
