@@ -135,7 +135,7 @@ pub(crate) struct CompareArgs {
     /// Error at which the error maps saturate
     #[arg(long, value_name = "E", default_value_t = 0.5, value_parser = parse_error_scale)]
     pub(crate) error_scale: f32,
-    /// Folder to write to [default: out/<scene name>]
+    /// Folder to write to [default: out/NAME, by the scene]
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

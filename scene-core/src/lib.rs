@@ -1,6 +1,6 @@
 //! The scene core of Gnomon: everything that shadow techniques share.
 //!
-//! Data flows one way: a [`Scene`](geometry::Scene) is loaded ([`io`]) or generated ([`scenes`]), a technique
+//! Data flows one way: a [`Scene`] is loaded ([`io`]) or generated ([`scenes`]), a technique
 //! *prepares* what depends on scene and light, *shades* a [`GBuffer`], and the resulting
 //! [`VisibilityImage`] is held against ground truth ([`mod@reference`]) by [`metrics`].
 //!

@@ -1,3 +1,5 @@
+//! Exact V against hand-computed values and against samples.
+
 use glam::{Affine3A, Vec3};
 
 use super::*;

@@ -1,3 +1,5 @@
+//! Points of each kind of light: on the light, and uniform in the measure that V is defined by.
+
 use glam::DVec2;
 
 use super::*;
