@@ -9,7 +9,7 @@
 //!   is below it. It is 2⁻¹³ of the diagonal lower (an eighth of a pixel of the picture), so that it does not
 //!   coincide with a floor; a mesh that is flat itself floats 0.05 r above it, so that its shadow is seen.
 //! - **camera**: 25° above the horizon, 30° to the left of the front, 40° field of view, as near as possible
-//!   with the box and its shadow (from the light's middle) in the picture.
+//!   with all vertices and their shadows (from the light's middle) in the picture.
 //!
 //! The front is +z for +y up (as in glTF), −y for +z up, +y for +x up. The rule holds at any scale and place
 //! that f32 resolves. It is made for objects: a closed room is seen from outside, and needs a scene file with
@@ -183,7 +183,7 @@ pub fn framed_ground(bounds: Aabb, up: UpAxis) -> Result<TriangleMesh, FramingEr
     let height = extent.ground_height(up);
     let reach = light_corners(&light)
         .into_iter()
-        .flat_map(|light| shadow_on_ground(&extent, light, up, height))
+        .flat_map(|light| extent.corners().map(|corner| shadow_on_ground(corner, light, up, height)))
         .map(|p| (p - extent.center).dot(right).abs().max((p - extent.center).dot(front).abs()))
         .fold(0.0, f64::max);
     let half = (1.2 * reach).max(4.0 * extent.radius);
@@ -204,28 +204,27 @@ fn light_corners(light: &Light) -> Vec<DVec3> {
     }
 }
 
-/// Where the box's corners throw their shadows, seen from a point that lies above all of them.
-fn shadow_on_ground(extent: &Extent, light: DVec3, up: DVec3, height: f64) -> [DVec3; 8] {
-    extent.corners().map(|corner| {
-        let along = (light.dot(up) - height) / (light.dot(up) - corner.dot(up));
-        light + (corner - light) * along
-    })
+/// Where `point` throws its shadow, seen from a light that lies above it.
+fn shadow_on_ground(point: DVec3, light: DVec3, up: DVec3, height: f64) -> DVec3 {
+    let along = (light.dot(up) - height) / (light.dot(up) - point.dot(up));
+    light + (point - light) * along
 }
 
-/// The rule's camera for geometry within `bounds`, with a picture of `width` × `height` pixels.
+/// The rule's camera for geometry with vertices at `points`, with a picture of `width` × `height` pixels.
 ///
 /// # Errors
 /// Geometry that is empty, or whose size or place leaves what f32 resolves.
-pub fn framed_camera(bounds: Aabb, up: UpAxis, width: u32, height: u32) -> Result<Camera, FramingError> {
+pub fn framed_camera(points: &[Vec3], up: UpAxis, width: u32, height: u32) -> Result<Camera, FramingError> {
+    let bounds = Aabb::from_points(points.iter().copied());
     let extent = Extent::of(bounds)?;
     let light = framed_light(bounds, up)?;
     let towards = up.towards(-30.0, 25.0);
     let [_, up_axis, _] = up.axes();
     let ground = extent.ground_height(up_axis);
-    let mut points = extent.corners().to_vec();
-    if let LightPoint::At(middle) = light.center() {
-        points.extend(shadow_on_ground(&extent, middle.as_dvec3(), up_axis, ground));
-    }
+    let throw = |point: DVec3| match light.center() {
+        LightPoint::At(middle) => shadow_on_ground(point, middle.as_dvec3(), up_axis, ground),
+        LightPoint::Towards(_) => point,
+    };
 
     let right = up_axis.cross(towards).normalize();
     let upright = towards.cross(right);
@@ -236,11 +235,12 @@ pub fn framed_camera(bounds: Aabb, up: UpAxis, width: u32, height: u32) -> Resul
     // |a − e| ≤ tan · (d − c), with the eye at `e` and `d`. So d must part the bounds of all points for e.
     let fit = |axis: DVec3, tan: f64| {
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-        for point in &points {
-            let local = *point - extent.center;
-            let (a, c) = (local.dot(axis), local.dot(towards));
-            low = low.max(a + tan * c);
-            high = high.min(a - tan * c);
+        for point in points.iter().map(|point| point.as_dvec3()) {
+            for local in [point, throw(point)].map(|place| place - extent.center) {
+                let (a, c) = (local.dot(axis), local.dot(towards));
+                low = low.max(a + tan * c);
+                high = high.min(a - tan * c);
+            }
         }
         ((low + high) * 0.5, (low - high) / (2.0 * tan))
     };
@@ -276,6 +276,8 @@ pub(super) fn complete(
     up: UpAxis,
 ) -> Result<(), FramingError> {
     let bounds = setup.scene.bounds();
+    // Without the ground, which comes last.
+    let vertices = setup.scene.positions().len();
     let mut added = Vec::new();
     if camera.is_none() && setup.lights.is_empty() {
         let flags = ObjectFlags { casts: false, ..Default::default() };
@@ -286,7 +288,7 @@ pub(super) fn complete(
         Some(camera) => camera,
         None => {
             added.push("a camera");
-            framed_camera(bounds, up, DEFAULT_SIDE, DEFAULT_SIDE)?
+            framed_camera(&setup.scene.positions()[..vertices], up, DEFAULT_SIDE, DEFAULT_SIDE)?
         }
     };
     if setup.lights.is_empty() {

@@ -3,9 +3,8 @@
 use glam::{Affine3A, EulerRot, Quat, Vec3};
 
 use super::schema::{CameraEntry, LightEntry, MeshTable};
-use crate::geometry::Aabb;
 use crate::io::framing::{self, FramingError, UpAxis};
-use crate::{Camera, Light};
+use crate::{Camera, Light, Scene};
 
 /// A field's name within its table, and what is wrong with it.
 pub(super) type FieldFault = (&'static str, String);
@@ -123,15 +122,15 @@ pub(super) fn light(entry: &LightEntry) -> Result<Light, FieldFault> {
 }
 
 /// The camera that an entry describes; what it lacks is chosen by the rule of [`framing`].
-pub(super) fn camera(entry: &CameraEntry, bounds: Aabb, up: UpAxis) -> Result<Camera, FramingError> {
+pub(super) fn camera(entry: &CameraEntry, scene: &Scene, up: UpAxis) -> Result<Camera, FramingError> {
     let width = entry.width.unwrap_or(framing::DEFAULT_SIDE);
     let height = entry.height.unwrap_or(framing::DEFAULT_SIDE);
     let [eye, target] = [entry.eye, entry.target].map(|point| point.map(Vec3::from_array));
     let (eye, target) = match (eye, target) {
         (Some(eye), Some(target)) => (eye, target),
-        (Some(eye), None) => (eye, bounds.center()),
+        (Some(eye), None) => (eye, scene.bounds().center()),
         (None, target) => {
-            let framed = framing::framed_camera(bounds, up, width, height)?;
+            let framed = framing::framed_camera(scene.positions(), up, width, height)?;
             let target = target.unwrap_or(framed.target);
             (target + (framed.eye - framed.target), target)
         }

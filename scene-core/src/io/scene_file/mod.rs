@@ -77,7 +77,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions<'_>) -> Result<SceneSetup,
     let camera = match scene_file.camera {
         None => None,
         Some(entry) => {
-            let camera = convert::camera(&entry, scene.bounds(), up).map_err(unframed)?;
+            let camera = convert::camera(&entry, &scene, up).map_err(unframed)?;
             camera
                 .validate()
                 .map_err(|fault| LoadError::File { path: path.to_owned(), message: fault.to_string() })?;
