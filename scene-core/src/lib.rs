@@ -14,6 +14,7 @@
 //! | [`raster`] | the CPU rasteriser: depth from any projection, G-buffer |
 //! | [`bvh`] | closest hit and packets of shadow rays |
 //! | [`mod@reference`] | ray-traced ground truth and which pixels may be compared |
+//! | [`relevance`] | what light and camera make irrelevant |
 //! | [`metrics`] | errors of a visibility image |
 //! | [`technique`] | the [`ShadowTechnique`] trait, settings, reports |
 //! | `gpu` | its GPU half, with the feature of that name |
@@ -36,6 +37,7 @@ pub mod light;
 pub mod metrics;
 pub mod raster;
 pub mod reference;
+pub mod relevance;
 pub mod report;
 pub mod scenes;
 pub mod setup;

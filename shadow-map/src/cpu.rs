@@ -1,5 +1,7 @@
 //! The CPU path, one function a stage, in the order and with the names of the report.
 
+use std::ops::Range;
+
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use scene_core::geometry::Object;
@@ -23,10 +25,14 @@ pub struct ShadowMapView {
     pub triangles: Vec<u32>,
 }
 
-/// `prepare.maps`: draws the casters as each view sees them.
-pub fn render_maps(scene: &Scene, casters: &[&Object], views: &[LightView], size: u32) -> Vec<ShadowMapView> {
-    let ranges: Vec<_> = casters.iter().map(|object| object.triangles.clone()).collect();
-    let options = DepthOptions { triangles: Some(&ranges), ..Default::default() };
+/// `prepare.maps`: draws the casters, ranges of [`Scene::triangles`], as each view sees them.
+pub fn render_maps(
+    scene: &Scene,
+    casters: &[Range<usize>],
+    views: &[LightView],
+    size: u32,
+) -> Vec<ShadowMapView> {
+    let options = DepthOptions { triangles: Some(casters), ..Default::default() };
     let mut scratch = RasterScratch::new();
     views
         .iter()

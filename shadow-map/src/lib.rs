@@ -5,13 +5,16 @@ pub mod light_views;
 mod params;
 pub mod receiver_plane;
 mod technique;
+pub mod view_casters;
 
 use glam::Vec3;
 use rayon::prelude::*;
 use scene_core::geometry::Object;
-use scene_core::{GBuffer, Light, Report, Scene, VisibilityImage};
+use scene_core::relevance::{self, Backdrops, CasterChunks, RelevantCasters};
+use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
 
 use cpu::{Lookup, ShadowMapView};
+use light_views::LightView;
 pub use params::{ShadowMapParams, Variant};
 pub use technique::Factory;
 
@@ -39,18 +42,59 @@ impl ShadowMap {
 
     /// Draws the maps of `light`. They hold for any camera.
     pub fn prepare<'a>(&self, scene: &'a Scene, light: &Light) -> (PreparedShadowMap<'a>, Report) {
+        self.prepare_with(scene, light, |_, _, _| None)
+    }
+
+    /// Draws into the maps of `light` only what can be looked up for surfaces that `camera` sees: they hold for this
+    /// camera alone, and for free points only where it sees them. Every pixel is as from
+    /// [`prepare`](Self::prepare), bit for bit. `chunks` must be of `scene`; they are kept from frame to frame.
+    ///
+    /// With `skip` off it is [`prepare`](Self::prepare).
+    pub fn prepare_for_view<'a>(
+        &self,
+        scene: &'a Scene,
+        light: &Light,
+        camera: &Camera,
+        chunks: &CasterChunks,
+    ) -> (PreparedShadowMap<'a>, Report) {
+        self.prepare_with(scene, light, |casters, views, report| {
+            self.params.skip.then(|| {
+                report.time("prepare.relevance", |report| {
+                    let map_size = self.params.map_size;
+                    let region = view_casters::looked_up(scene, light, camera, views, map_size);
+                    let kept = relevance::relevant_casters(scene, &region, chunks, |id| {
+                        let object = &scene.objects()[id as usize];
+                        !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
+                    });
+                    kept.book(report);
+                    kept
+                })
+            })
+        })
+    }
+
+    fn prepare_with<'a>(
+        &self,
+        scene: &'a Scene,
+        light: &Light,
+        choose: impl FnOnce(&Backdrops<'a>, &[LightView], &mut Report) -> Option<RelevantCasters>,
+    ) -> (PreparedShadowMap<'a>, Report) {
         let mut report = Report::default();
         let tolerance = receiver_plane::plane_tolerance(scene.bounds(), light);
         let (casters, views) = report.time("prepare.views", |_| {
-            let casters = light_views::relevant_casters(scene, light, tolerance);
+            let casters = relevance::told_apart(scene, light, tolerance);
             let views = light_views::light_views(scene, light, &casters.drawn, self.params.skip);
             (casters, views)
         });
         report.skip("casters", casters.backdrops.len() as u64);
         report.skip("faces", views.skipped_faces);
-        let maps = report.time("prepare.maps", |_| {
-            cpu::render_maps(scene, &casters.drawn, &views.views, self.params.map_size)
-        });
+        let chosen = choose(&casters, &views.views, &mut report);
+        let ranges = match chosen {
+            Some(chosen) => chosen.ranges,
+            None => casters.drawn.iter().map(|object| object.triangles.clone()).collect(),
+        };
+        let maps = report
+            .time("prepare.maps", |_| cpu::render_maps(scene, &ranges, &views.views, self.params.map_size));
         let texels = u64::from(self.params.map_size) * u64::from(self.params.map_size);
         // A depth and a triangle index a texel.
         report.bytes = maps.len() as u64 * texels * 8;

@@ -111,6 +111,15 @@ impl LightView {
         }
     }
 
+    /// [`half_diagonal`](Self::half_diagonal) at `distance` from the light along the view's axis, in scene units; of
+    /// a parallel view it is the same everywhere.
+    pub fn half_diagonal_at(&self, distance: f64) -> f64 {
+        match self.unproject {
+            Unprojection::Parallel { x, y, .. } => f64::from(x.length().hypot(y.length())),
+            Unprojection::Central { x, y, .. } => f64::from(x.length().hypot(y.length())) * distance,
+        }
+    }
+
     /// The world-space point at normalised device coordinates `ndc` and reversed depth `depth > 0`.
     #[inline]
     pub fn unproject(&self, ndc: Vec2, depth: f32) -> Vec3 {
@@ -237,53 +246,6 @@ fn smallest_extent(bounds: Aabb) -> f32 {
     (bounds.magnitude() * MARGIN).max(f32::MIN_POSITIVE * 1e6)
 }
 
-/// The casters of a scene, told apart by whether anything lies behind them.
-#[derive(Clone, Debug, Default)]
-pub struct Casters<'a> {
-    /// Those that the maps must hold.
-    pub drawn: Vec<&'a Object>,
-    /// Flat ones with the whole scene on the light's side: they shadow no surface, only free points beyond.
-    pub backdrops: Vec<&'a Object>,
-}
-
-/// Tells casters from backdrops: an object whose triangles all lie in one plane, with the whole scene on the
-/// light's side of it, shadows no surface (but its own back, which is dark by its normal). `tolerance` is the
-/// distance below which a point does not count as behind a plane; the comparison of
-/// [`crate::receiver_plane`] uses the same, so that leaving such a caster out changes no pixel.
-pub fn relevant_casters<'a>(scene: &'a Scene, light: &Light, tolerance: f32) -> Casters<'a> {
-    let casters = scene.objects().iter().filter(|o| o.flags.casts && !o.triangles.is_empty());
-    let (backdrops, drawn) = casters.partition(|object| nothing_behind(scene, light, object, tolerance));
-    Casters { drawn, backdrops }
-}
-
-fn nothing_behind(scene: &Scene, light: &Light, object: &Object, tolerance: f32) -> bool {
-    // A mask's holes would have to be looked up for free points; maps do that already.
-    if object.alpha.is_some() {
-        return false;
-    }
-    let normal_of = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a).try_normalize();
-    let Some((anchor, normal)) =
-        object.triangles.clone().find_map(|t| normal_of(scene.corners(t)).map(|n| (scene.corners(t)[0], n)))
-    else {
-        return false;
-    };
-    let towards_light = match light.center() {
-        LightPoint::At(place) => normal.dot(place - anchor),
-        LightPoint::Towards(direction) => normal.dot(direction) * f32::MAX.sqrt(),
-    };
-    if towards_light.abs() <= tolerance {
-        return false;
-    }
-    let normal = normal * towards_light.signum();
-    let height = |p: Vec3| normal.dot(p - anchor);
-    // Half the tolerance each: a point less than the other half behind this plane is less than the whole
-    // behind any triangle's own.
-    scene.positions()[object.vertices.clone()].iter().all(|&p| height(p).abs() <= 0.5 * tolerance)
-        && scene.objects().iter().filter(|o| o.flags.receives).all(|o| {
-            o.bounds.is_empty() || o.bounds.corners().into_iter().all(|c| height(c) >= -0.5 * tolerance)
-        })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -325,19 +287,6 @@ mod tests {
                 assert!(back.distance(p) < 1e-5, "{light:?}: {p} came back as {back}");
             }
         }
-    }
-
-    #[test]
-    fn the_ground_under_everything_is_no_caster() {
-        let scene = scene_of(&[quad_at(0.0, 50.0), quad_at(1.0, 1.0)]);
-        for light in &LIGHTS[..2] {
-            let casters = relevant_casters(&scene, light, 1e-5);
-            assert_eq!((casters.drawn.len(), casters.backdrops.len()), (1, 1));
-        }
-        // From below, the ground hides everything.
-        let below = Light::Point { position: Vec3::new(0.0, -3.0, 0.0) };
-        let casters = relevant_casters(&scene, &below, 1e-5).drawn;
-        assert_eq!((casters.len(), casters[0].bounds.max.y), (1, 0.0));
     }
 
     #[test]

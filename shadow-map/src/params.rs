@@ -32,11 +32,15 @@ pub struct ShadowMapParams {
     pub map_size: u32,
     /// Leave out what cannot change the image: views without casters or receivers. Off only to measure.
     pub skip: bool,
+    /// Draw into the maps only what can be looked up from the query's camera. The maps then hold for that camera
+    /// alone, and for points that it can see; their fit does not change, nor does any pixel. Needs `skip`. Worth
+    /// it where the maps are drawn anew for every frame of a scene much larger than the view.
+    pub view_dependent: bool,
 }
 
 impl ShadowMapParams {
     const fn with_map_size(map_size: u32) -> Self {
-        Self { variant: Variant::Hard, map_size, skip: true }
+        Self { variant: Variant::Hard, map_size, skip: true, view_dependent: false }
     }
 }
 
@@ -68,6 +72,12 @@ impl Params for ShadowMapParams {
             unit: "",
             doc: "leave out what cannot change the image",
         },
+        Setting {
+            name: "view_dependent",
+            kind: SettingKind::Bool,
+            unit: "",
+            doc: "draw only casters that the camera's view needs; the maps then hold for that camera alone",
+        },
     ];
 
     const PRESETS: &'static [Preset<Self>] = &[
@@ -94,6 +104,7 @@ mod tests {
         };
         assert_eq!(set("map_size", "64").unwrap().map_size, 64);
         assert!(!set("skip", "false").unwrap().skip);
+        assert!(set("view_dependent", "true").unwrap().view_dependent);
         for (key, value) in [("map_size", "0"), ("map_size", "big"), ("variant", "soft"), ("size", "1")] {
             assert!(set(key, value).is_err(), "{key}={value}");
         }

@@ -1,6 +1,7 @@
 //! The trait's implementation, nothing else.
 
 use glam::Vec3;
+use scene_core::relevance::CasterChunks;
 use scene_core::technique::{
     Capability, Description, Params, PreparedShadow, Setting, SettingsError, ShadowQuery, ShadowTechnique,
     Support, TechniqueError, TechniqueFactory,
@@ -41,8 +42,15 @@ impl ShadowTechnique for ShadowMap {
         &self,
         query: &ShadowQuery<'a>,
     ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError> {
-        let (prepared, report) = ShadowMap::prepare(self, query.scene, query.light);
-        Ok((Box::new(prepared), report))
+        if !self.params.view_dependent {
+            let (prepared, report) = ShadowMap::prepare(self, query.scene, query.light);
+            return Ok((Box::new(prepared), report));
+        }
+        let mut report = Report::default();
+        let chunks = report.time("prepare.chunks", |_| CasterChunks::new(query.scene));
+        let (prepared, rest) = self.prepare_for_view(query.scene, query.light, query.camera, &chunks);
+        report.merge(&rest);
+        Ok((Box::new(ForOneCamera(prepared)), report))
     }
 }
 
@@ -64,6 +72,23 @@ impl PreparedShadow for PreparedShadowMap<'_> {
 
     fn survives_camera(&self) -> bool {
         true
+    }
+}
+
+/// Maps that hold for the camera they were made for only.
+struct ForOneCamera<'a>(PreparedShadowMap<'a>);
+
+impl PreparedShadow for ForOneCamera<'_> {
+    fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError> {
+        PreparedShadow::shade(&self.0, gbuffer, visibility)
+    }
+
+    fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Result<Report, TechniqueError> {
+        PreparedShadow::visibility_at(&self.0, points, visibility)
+    }
+
+    fn survives_camera(&self) -> bool {
+        false
     }
 }
 

@@ -1,0 +1,142 @@
+//! Where the surfaces are that anyone asks visibility of: a convex polyhedron around what is seen.
+
+use glam::{DVec3, Vec3};
+
+use super::extent::{LightExtent, reach_of};
+use super::{HalfSpace, Polyhedron, Side};
+use crate::geometry::Aabb;
+use crate::light::LightPoint;
+use crate::{Camera, Light, Scene};
+
+/// What a seen position may be off, as a share of the largest coordinate in play: 2⁻¹⁸.
+///
+/// With u = 2⁻²⁴ and M the largest absolute coordinate of scene, camera and light: a G-buffer position is
+/// eye + t·direction, off by 6 u of a length of at most 2√3 M and an ulp of the sum, below 23 u M; a shadow
+/// ray is lifted by 8 u M ([`crate::bvh::shadow_origin`]); sampled points of a light are off by less than 4 u M.
+/// The sum is below 35 u M; 2⁻¹⁸ is 64 u.
+const MARGIN: f64 = 1.0 / 262_144.0;
+
+/// A convex polyhedron that holds all receivers that matter: the view's volume cut with the receivers' bounds,
+/// or given boxes; and with a spot's cone, outside of which nothing is asked.
+#[derive(Clone, Debug)]
+pub struct Receivers {
+    pub(super) region: Polyhedron,
+    pub(super) margin: f64,
+}
+
+impl Receivers {
+    /// What `camera` can see of the objects that receive shadows. An invalid camera sees everything.
+    pub fn seen_by(scene: &Scene, camera: &Camera, light: &Light) -> Self {
+        let margin = margin(scene.bounds(), camera.eye, light);
+        let planes: Vec<_> = frustum(camera).into_iter().map(|plane| plane.grown(margin)).collect();
+        let outside =
+            |bounds: &Aabb| planes.iter().any(|plane| plane.grown(margin).side_of(bounds) == Side::Outside);
+        let bounds = scene
+            .objects()
+            .iter()
+            .filter(|o| o.flags.receives && !outside(&o.bounds))
+            .fold(Aabb::EMPTY, |sum, o| sum.union(o.bounds));
+        let mut region = Polyhedron::from_box(bounds, margin);
+        planes.into_iter().for_each(|plane| region.clip(plane));
+        Self::reached(region, light, margin)
+    }
+
+    /// Receivers inside of `boxes`: bounds of seen positions, of an image or of its tiles
+    /// ([`super::TileBounds`]). They are held by the box around all of them with its edges and corners cut where
+    /// no box reaches.
+    pub fn within(scene: &Scene, boxes: &[Aabb], light: &Light) -> Self {
+        let bounds = boxes.iter().fold(Aabb::EMPTY, |sum, b| sum.union(*b));
+        let margin = margin(scene.bounds().union(bounds), Vec3::ZERO, light);
+        let mut region = Polyhedron::from_box(bounds, margin);
+        if boxes.len() > 1 {
+            for normal in slanted() {
+                let reach =
+                    |b: &Aabb| (normal * b.min.as_dvec3()).max(normal * b.max.as_dvec3()).element_sum();
+                let boxes = boxes.iter().filter(|b| !b.is_empty());
+                let offset = boxes.map(reach).fold(f64::NEG_INFINITY, f64::max);
+                region.clip(HalfSpace { normal, offset: offset + margin });
+            }
+        }
+        Self::reached(region, light, margin)
+    }
+
+    fn reached(mut region: Polyhedron, light: &Light, margin: f64) -> Self {
+        reach_of(light).into_iter().for_each(|plane| region.clip(plane.grown(margin)));
+        Self { region, margin }
+    }
+
+    /// Whether nothing is seen that could be in shadow.
+    pub fn is_empty(&self) -> bool {
+        self.region.is_empty()
+    }
+
+    /// The polyhedron.
+    pub fn region(&self) -> &Polyhedron {
+        &self.region
+    }
+
+    /// The largest distance of a receiver from `point`, in scene units; 0 if there is none.
+    pub fn farthest_from(&self, point: Vec3) -> f64 {
+        self.region.vertices().map(|v| v.distance(point.as_dvec3())).fold(0.0, f64::max)
+    }
+
+    /// The receivers with everything within `distance` of them: what a texel of that size stands for.
+    #[must_use]
+    pub fn grown(&self, distance: f64) -> Self {
+        Self { region: self.region.grown(distance), margin: self.margin }
+    }
+}
+
+/// See [`MARGIN`].
+fn margin(bounds: Aabb, eye: Vec3, light: &Light) -> f64 {
+    let light = match light.center() {
+        LightPoint::At(_) => LightExtent::of(light).magnitude(),
+        LightPoint::Towards(_) => 0.0,
+    };
+    let largest = f64::from(bounds.magnitude()).max(f64::from(eye.abs().max_element())).max(light);
+    largest * MARGIN
+}
+
+/// The half-spaces of a camera's view, near and far included; none for a camera that is not finite.
+fn frustum(camera: &Camera) -> Vec<HalfSpace> {
+    let axes = camera.world_from_view_rotation().as_dmat3();
+    let (eye, tan) = (camera.eye.as_dvec3(), camera.tan_half_fov().as_dvec2());
+    let ray = |x: f64, y: f64| axes * DVec3::new(x * tan.x, y * tan.y, -1.0);
+    let corners = [ray(-1.0, -1.0), ray(1.0, -1.0), ray(1.0, 1.0), ray(-1.0, 1.0)];
+    // Counter-clockwise as the camera sees them: a corner's ray × the next one's points out.
+    let mut planes: Vec<_> = (0..4)
+        .map(|i| {
+            let normal = corners[i].cross(corners[(i + 1) % 4]).normalize_or_zero();
+            HalfSpace { normal, offset: normal.dot(eye) }
+        })
+        .collect();
+    let forward = axes.x_axis.cross(axes.y_axis).normalize_or_zero() * -1.0;
+    let depth_of = |t: f32| forward.dot(eye + axes * DVec3::new(0.0, 0.0, -f64::from(t)));
+    planes.push(HalfSpace { normal: -forward, offset: -depth_of(camera.near) });
+    if camera.far.is_finite() {
+        planes.push(HalfSpace { normal: forward, offset: depth_of(camera.far) });
+    }
+    planes
+        .retain(|plane| plane.normal.is_finite() && plane.normal != DVec3::ZERO && plane.offset.is_finite());
+    planes
+}
+
+/// Unit normals through the edges and corners of a cube: with its faces, the 26 directions of a k-DOP.
+fn slanted() -> impl Iterator<Item = DVec3> {
+    (0..27).filter_map(|i| {
+        let v = DVec3::new(f64::from(i % 3 - 1), f64::from(i / 3 % 3 - 1), f64::from(i / 9 - 1));
+        (v.abs().element_sum() > 1.0).then(|| v.normalize())
+    })
+}
+
+/// The ids of the objects that receive shadows and that `light` may reach: all of them but those outside the cone
+/// of a spot, which have V = 0 everywhere.
+pub fn reached_receivers(scene: &Scene, light: &Light) -> Vec<u32> {
+    let margin = margin(scene.bounds(), Vec3::ZERO, light);
+    let planes: Vec<_> = reach_of(light).into_iter().map(|plane| plane.grown(margin)).collect();
+    let reached = |bounds: &Aabb| {
+        !bounds.is_empty() && planes.iter().all(|plane| plane.side_of(bounds) != Side::Outside)
+    };
+    let objects = (0..).zip(scene.objects());
+    objects.filter(|(_, o)| o.flags.receives && reached(&o.bounds)).map(|(id, _)| id).collect()
+}

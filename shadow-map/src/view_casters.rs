@@ -1,0 +1,35 @@
+//! Which casters the texels can hold that a camera's surfaces are looked up in.
+//!
+//! A lookup reads the surface at the centre of the receiver's texel, so what matters is everything on the lines from
+//! the light through those centres, before *and beyond* the receivers: if a surface beyond were left out, another
+//! one farther off would be stored and asked in its place. So each texel that is looked up holds the same
+//! triangle as in a map of all casters, and no pixel changes.
+
+use scene_core::light::LightPoint;
+use scene_core::relevance::{CasterRegion, Receivers};
+use scene_core::{Camera, Light, Scene};
+
+use crate::light_views::LightView;
+
+/// The region of those lines for surfaces that `camera` sees, in maps of `map_size` texels a side.
+///
+/// Receivers are grown by the diagonal of the largest texel at the distance of the farthest receiver: a texel's
+/// centre is half of it away at most, and the rasteriser's snapping
+/// ([`scene_core::raster::DEPTH_POSITION_ERROR`]) far less.
+pub fn looked_up(
+    scene: &Scene,
+    light: &Light,
+    camera: &Camera,
+    views: &[LightView],
+    map_size: u32,
+) -> CasterRegion {
+    let receivers = Receivers::seen_by(scene, camera, light);
+    let center = light.center();
+    let distance = match center {
+        LightPoint::At(place) => receivers.farthest_from(place),
+        LightPoint::Towards(_) => 0.0,
+    };
+    let half_diagonal = views.iter().map(|view| view.half_diagonal_at(distance)).fold(0.0, f64::max);
+    let texel = half_diagonal * 2.0 / f64::from(map_size.max(1));
+    CasterRegion::along(scene, &receivers.grown(texel), center)
+}
