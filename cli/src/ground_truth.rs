@@ -62,10 +62,14 @@ pub(crate) fn trace(
         if args.exact {
             return Ok(exact_reference(scene, &bvh, light, gbuffer, &progress)?);
         }
-        let sampling = ReferenceSettings { samples: args.samples, seed };
+        let sampling = ReferenceSettings { samples: args.samples, seed, skip: true };
         Ok(reference(scene, &bvh, light, gbuffer, &sampling, &progress)?)
     })?;
     let shade_ms = milliseconds_since(start);
+    if !args.exact {
+        report.skip("wholly lit pixels", traced.work.proved_lit);
+        report.skip("wholly dark pixels", traced.work.proved_dark);
+    }
     let truth = GroundTruth {
         visibility: traced.visibility,
         std_error: traced.std_error,

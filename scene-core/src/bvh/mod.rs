@@ -15,6 +15,7 @@
 //! Coordinates of any size work; where those relative to a ray's origin exceed 2³⁸ a slow path is taken, and
 //! what exceeds the range of f32 blocks nothing.
 
+mod cover;
 mod exact;
 mod filter;
 mod offset;
@@ -34,6 +35,7 @@ use exact::Crossing;
 use tree::{Link, Tree, WIDTH};
 use walk::Cutout;
 
+pub use cover::{Cover, LastCover, OUTLINE};
 pub use offset::shadow_origin;
 
 /// Where a ray meets a triangle.

@@ -5,6 +5,8 @@
 
 mod exact;
 mod occlusion;
+mod outline;
+mod proof;
 mod sampled;
 mod tiles;
 mod valid;
@@ -12,5 +14,5 @@ mod valid;
 pub use exact::{ExactError, exact_reference};
 pub use occlusion::{CasterSearch, Occlusion};
 pub use sampled::{ReferenceSettings, reference};
-pub use tiles::{Cancelled, Reference, no_progress};
+pub use tiles::{Cancelled, Reference, Work, no_progress};
 pub use valid::valid_pixels;

@@ -10,6 +10,12 @@ use crate::light::LightPoint;
 pub trait Occlusion: Sync {
     /// Sets `blocked[i]` to whether anything lies between `origin` and `targets[i]`. Slices of equal length.
     fn occluded_from(&self, origin: Vec3, targets: &[LightPoint], blocked: &mut [bool]);
+
+    /// The tree that answers, if there is one: whole lights are proved seen or hidden with it, and no sample of
+    /// them is traced.
+    fn tree(&self) -> Option<&Bvh> {
+        None
+    }
 }
 
 /// Something that finds the casters near a region.
@@ -23,6 +29,10 @@ pub trait CasterSearch: Sync {
 impl Occlusion for Bvh {
     fn occluded_from(&self, origin: Vec3, targets: &[LightPoint], blocked: &mut [bool]) {
         self.occluded_from(origin, targets, blocked);
+    }
+
+    fn tree(&self) -> Option<&Bvh> {
+        Some(self)
     }
 }
 

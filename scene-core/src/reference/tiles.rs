@@ -1,6 +1,6 @@
 //! Pixels shared among threads by tiles, the same for every way to find the truth.
 
-use std::ops::ControlFlow;
+use std::ops::{AddAssign, ControlFlow};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
@@ -19,10 +19,33 @@ pub struct Reference {
     /// differences measure what stratification leaves. Where no stratum disagrees, that would be 0, though light or
     /// shadow too thin for any sample can remain; the error is then given as 1 / samples, its standard deviation
     /// given that all samples agree and nothing else is known. It is 0 only where V is certain: for a light without
-    /// extent, where no ray was needed, and in exact truth.
+    /// extent, where no ray was needed, where it is proved, and in exact truth.
     pub std_error: Vec<f32>,
-    /// Shadow rays traced. Samples below a surface's tangent plane or outside a spot's cone need none.
+    /// How it was found.
+    pub work: Work,
+}
+
+/// What ground truth took. Pixels that receive no shadow or lie outside a spot's cone take nothing and are in none
+/// of the counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Shadow rays traced. Samples below a surface's tangent plane need none.
     pub rays: u64,
+    /// Pixels proved wholly lit.
+    pub proved_lit: u64,
+    /// Pixels proved wholly dark.
+    pub proved_dark: u64,
+    /// Pixels whose samples were all looked at.
+    pub sampled: u64,
+}
+
+impl AddAssign for Work {
+    fn add_assign(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.proved_lit += other.proved_lit;
+        self.proved_dark += other.proved_dark;
+        self.sampled += other.sampled;
+    }
 }
 
 /// The work was stopped by its progress callback.
@@ -55,10 +78,10 @@ impl Estimate {
 /// A finished tile: an estimate for each pixel that sees a surface.
 struct Tile {
     estimates: Vec<Option<Estimate>>,
-    rays: u64,
+    work: Work,
 }
 
-/// Calls `estimate` for every pixel of `gbuffer` whose V is in question, with a thread's buffers and a count of rays to
+/// Calls `estimate` for every pixel of `gbuffer` whose V is in question, with a thread's buffers and a tally to
 /// add to. Objects that do not receive are lit and points that the light does not reach are dark without asking.
 pub(super) fn estimate_tiles<B>(
     scene: &Scene,
@@ -66,7 +89,7 @@ pub(super) fn estimate_tiles<B>(
     gbuffer: &GBuffer,
     progress: &(dyn Fn(f32) -> ControlFlow<()> + Sync),
     buffers: impl Fn() -> B + Sync + Send,
-    estimate: impl Fn(usize, &mut B, &mut u64) -> Estimate + Sync,
+    estimate: impl Fn(usize, &mut B, &mut Work) -> Estimate + Sync,
 ) -> Result<Reference, Cancelled> {
     let tiles_x = gbuffer.width.div_ceil(TILE);
     let tiles = tiles_x as usize * gbuffer.height.div_ceil(TILE) as usize;
@@ -80,7 +103,7 @@ pub(super) fn estimate_tiles<B>(
     let estimated: Vec<Tile> = (0..tiles)
         .into_par_iter()
         .map_init(buffers, |buffers, tile| {
-            let mut rays = 0;
+            let mut work = Work::default();
             let one = |pixel| {
                 if !gbuffer.is_seen(pixel) {
                     None
@@ -89,13 +112,13 @@ pub(super) fn estimate_tiles<B>(
                 } else if !light.reaches(gbuffer.position[pixel]) {
                     Some(Estimate::certain(0.0))
                 } else {
-                    Some(estimate(pixel, buffers, &mut rays))
+                    Some(estimate(pixel, buffers, &mut work))
                 }
             };
             let estimates = pixels(tile).map(one).collect();
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             match progress(done as f32 / tiles as f32) {
-                ControlFlow::Continue(()) => Ok(Tile { estimates, rays }),
+                ControlFlow::Continue(()) => Ok(Tile { estimates, work }),
                 ControlFlow::Break(()) => Err(Cancelled),
             }
         })
@@ -103,9 +126,9 @@ pub(super) fn estimate_tiles<B>(
 
     let mut visibility = VisibilityImage::new(gbuffer.width, gbuffer.height);
     let mut std_error = visibility.values.clone();
-    let mut rays = 0;
-    for (tile, Tile { estimates, rays: traced }) in estimated.iter().enumerate() {
-        rays += traced;
+    let mut work = Work::default();
+    for (tile, Tile { estimates, work: of_tile }) in estimated.iter().enumerate() {
+        work += *of_tile;
         for (pixel, estimate) in pixels(tile).zip(estimates) {
             if let Some(estimate) = estimate {
                 visibility.values[pixel] = estimate.visibility;
@@ -113,7 +136,7 @@ pub(super) fn estimate_tiles<B>(
             }
         }
     }
-    Ok(Reference { visibility, std_error, rays })
+    Ok(Reference { visibility, std_error, work })
 }
 
 /// Indices of the pixels of the tile whose first one is (`x`, `y`), row by row.

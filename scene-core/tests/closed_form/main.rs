@@ -126,7 +126,7 @@ fn agreement(
 }
 
 fn sample(scene: &Scene, casters: &impl Occlusion, light: &Light, gbuffer: &GBuffer) -> Reference {
-    let settings = ReferenceSettings { samples: SAMPLES, seed: 3 };
+    let settings = ReferenceSettings { samples: SAMPLES, seed: 3, ..Default::default() };
     light.validate().unwrap();
     reference(scene, casters, light, gbuffer, &settings, &no_progress).unwrap()
 }

@@ -148,7 +148,7 @@ fn soups_agree_with_samples() {
             .map(|p| Vec3::new(p.x * 3.0 - 1.5, 0.0, p.y * 3.0 - 1.5))
             .collect();
         let gbuffer = floor_at(&positions);
-        let settings = ReferenceSettings { samples: 1024, seed: 5 };
+        let settings = ReferenceSettings { samples: 1024, seed: 5, ..Default::default() };
         let sampled = reference(&scene, &Naive(&scene), light, &gbuffer, &settings, &no_progress).unwrap();
         let (mut squares, mut variances, mut sum) = (0.0, 0.0, 0.0);
         for (pixel, v) in exact(&scene, light, &gbuffer).into_iter().enumerate() {
