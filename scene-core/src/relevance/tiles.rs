@@ -122,7 +122,7 @@ impl TileBounds {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
+    use glam::{Vec3, Vec4};
 
     use super::*;
 
@@ -160,7 +160,7 @@ mod tests {
         }
         assert!(tiles.tiles[1].projected(shift).unwrap().is_empty());
         // An eye among the positions.
-        let perspective = Mat4::perspective_infinite_reverse_rh(1.0, 1.0, 0.1);
+        let perspective = Mat4::from_cols(Vec4::X, Vec4::Y, Vec4::NEG_W, Vec4::Z * 0.1);
         assert_eq!(tiles.tiles[0].projected(perspective), None);
     }
 }
