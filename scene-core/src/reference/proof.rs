@@ -23,6 +23,10 @@ pub(super) enum Proof {
 /// Side of the smallest blocks, in pixels.
 const BLOCK: u32 = 4;
 
+/// Receivers are on the scene's surfaces and so within its largest coordinate, but for rounding; those that lie farther
+/// out than this many times that are no one's and not proved.
+const REACH: f32 = 1.0 + 1.0 / 1024.0;
+
 /// Smallest blocks along the side of a tile.
 const BLOCKS: u32 = TILE / BLOCK;
 
@@ -35,22 +39,31 @@ pub(super) struct Memory {
     origins: Vec<Vec3>,
 }
 
+impl<'a> Prover<'a> {
+    /// `magnitude` is the largest coordinate of the scene.
+    pub(super) fn new(tree: &'a Bvh, light: &'a Light, gbuffer: &'a GBuffer, magnitude: f32) -> Self {
+        // What is farther out is not proved, so this holds for all receivers.
+        let outline = LightOutline::of_all(light, Vec3::splat(REACH * magnitude), magnitude);
+        Self { tree, light, gbuffer, magnitude, outline }
+    }
+}
+
 /// Proves pixels of one image.
 pub(super) struct Prover<'a> {
-    pub(super) tree: &'a Bvh,
-    pub(super) light: &'a Light,
-    pub(super) gbuffer: &'a GBuffer,
+    tree: &'a Bvh,
+    light: &'a Light,
+    gbuffer: &'a GBuffer,
     /// Largest coordinate of the scene.
-    pub(super) magnitude: f32,
+    magnitude: f32,
+    /// What holds the light for all receivers.
+    outline: Option<LightOutline>,
 }
 
 impl Prover<'_> {
     /// Tries the blocks of the tile whose first pixel is (`x`, `y`).
     pub(super) fn begin_tile(&self, x: u32, y: u32, memory: &mut Memory) {
         memory.lit = 0;
-        if self.light.is_extended() {
-            self.block(x, y, TILE, memory);
-        }
+        self.block(x, y, TILE, memory);
     }
 
     fn block(&self, x: u32, y: u32, side: u32, memory: &mut Memory) {
@@ -59,8 +72,9 @@ impl Prover<'_> {
             return;
         }
         memory.origins.clear();
+        let Some(outline) = &self.outline else { return };
         let mut all_above = true;
-        let mut first: Option<(Vec3, LightOutline)> = None;
+        let mut first = None;
         for row in y..(y + side).min(height) {
             for column in x..(x + side).min(width) {
                 let pixel = row as usize * width as usize + column as usize;
@@ -69,21 +83,14 @@ impl Prover<'_> {
                 }
                 let (position, normal) = (self.gbuffer.position[pixel], self.gbuffer.normal[pixel]);
                 let origin = shadow_origin(position, normal, self.magnitude);
-                if first.is_none() {
-                    // The outline of a sphere is another for every receiver.
-                    let Some(outline) = LightOutline::of_all(self.light, origin, self.magnitude) else {
-                        return;
-                    };
-                    first = Some((normal, outline));
-                }
-                let Some((_, outline)) = &first else { return };
+                first.get_or_insert(normal);
                 let (lowest, _, margin) = outline.heights(position, normal);
-                all_above &= lowest > margin && origin.is_finite();
+                all_above &= lowest > margin && self.is_near(origin);
                 memory.origins.push(origin);
             }
         }
-        let Some((normal, outline)) = &first else { return };
-        let shaft = || LightShaft::new(&memory.origins, *normal, outline, self.magnitude);
+        let Some(normal) = first else { return };
+        let shaft = || LightShaft::new(&memory.origins, normal, outline, self.magnitude);
         if all_above && self.tree.misses(shaft().sides()) {
             for row in 0..side / BLOCK {
                 for column in 0..side / BLOCK {
@@ -98,6 +105,10 @@ impl Prover<'_> {
         }
     }
 
+    fn is_near(&self, origin: Vec3) -> bool {
+        origin.abs().max_element() <= REACH * self.magnitude
+    }
+
     /// Tries to settle a pixel of the tile begun last. Lights without extent take one ray and are left to it.
     pub(super) fn prove(&self, pixel: usize, memory: &mut Memory) -> Option<Proof> {
         let (x, y) = (pixel as u32 % self.gbuffer.width, pixel as u32 / self.gbuffer.width);
@@ -106,7 +117,14 @@ impl Prover<'_> {
         }
         let (position, normal) = (self.gbuffer.position[pixel], self.gbuffer.normal[pixel]);
         let origin = shadow_origin(position, normal, self.magnitude);
-        let outline = LightOutline::new(self.light, origin, self.magnitude)?;
+        if !self.is_near(origin) {
+            return None;
+        }
+        let outline = match self.light {
+            // Of a sphere every receiver sees another part.
+            Light::Sphere { .. } => LightOutline::new(self.light, origin, self.magnitude),
+            _ => self.outline,
+        }?;
         let (lowest, highest, margin) = outline.heights(position, normal);
         if highest < -margin {
             return Some(Proof::Dark);

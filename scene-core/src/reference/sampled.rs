@@ -53,7 +53,7 @@ pub fn reference(
 ) -> Result<Reference, Cancelled> {
     let magnitude = scene.bounds().magnitude();
     let tree = casters.tree().filter(|_| settings.skip);
-    let prover = tree.map(|tree| Prover { tree, light, gbuffer, magnitude });
+    let prover = tree.map(|tree| Prover::new(tree, light, gbuffer, magnitude));
     let begin = |x, y, scratch: &mut Scratch| {
         if let Some(prover) = &prover {
             prover.begin_tile(x, y, &mut scratch.proofs);
