@@ -20,6 +20,7 @@ mod exact;
 mod filter;
 mod offset;
 mod query;
+mod region;
 mod shaft;
 mod tree;
 mod walk;
@@ -37,6 +38,7 @@ use walk::Cutout;
 
 pub use cover::{Cover, LastCover, OUTLINE};
 pub use offset::shadow_origin;
+pub use region::HalfSpace;
 
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,6 +8,7 @@ mod occlusion;
 mod outline;
 mod proof;
 mod sampled;
+mod shaft;
 mod tiles;
 mod valid;
 

@@ -99,6 +99,23 @@ impl LightOutline {
         outline.margin.is_finite().then_some(outline)
     }
 
+    /// An outline that holds for all receivers no farther from 0 than `receiver` or `magnitude`: of a sphere, the cube
+    /// around it.
+    pub(super) fn of_all(light: &Light, receiver: Vec3, magnitude: f32) -> Option<Self> {
+        let Light::Sphere { center, radius } = *light else {
+            return Self::new(light, receiver, magnitude);
+        };
+        let (half_u, half_v) = (Vec3::X * radius, Vec3::Y * radius);
+        let mut cube = Self::new(&Light::Rect { center, half_u, half_v }, receiver, magnitude)?;
+        for (corner, point) in cube.points[..8].iter_mut().enumerate() {
+            let sign = if corner & 4 == 4 { 1.0 } else { -1.0 };
+            if let LightPoint::At(place) = point {
+                place.z += sign * radius;
+            }
+        }
+        Some(cube)
+    }
+
     /// Two polygons around circles, given by middle and radius.
     fn drum(&mut self, axis: DVec3, near: (DVec3, f64), far: (DVec3, f64)) {
         let (lower, upper) = self.points.split_at_mut(SIDES);

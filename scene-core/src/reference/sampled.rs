@@ -6,9 +6,9 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::Occlusion;
-use super::proof::{Proof, Receiver, prove};
+use super::proof::{Memory, Proof, Prover};
 use super::tiles::{Cancelled, Estimate, Reference, Work, estimate_tiles};
-use crate::bvh::{LastCover, shadow_origin};
+use crate::bvh::shadow_origin;
 use crate::light::LightPoint;
 use crate::light::sampling::{LightView, SampleKey, Strata};
 use crate::{GBuffer, Light, Scene};
@@ -51,9 +51,30 @@ pub fn reference(
     settings: &ReferenceSettings,
     progress: &(dyn Fn(f32) -> ControlFlow<()> + Sync),
 ) -> Result<Reference, Cancelled> {
-    let tracer = Tracer { casters, light, gbuffer, settings, magnitude: scene.bounds().magnitude() };
-    estimate_tiles(scene, light, gbuffer, progress, Scratch::default, |pixel, scratch, work| {
-        tracer.pixel(pixel, scratch, work)
+    let magnitude = scene.bounds().magnitude();
+    let tree = casters.tree().filter(|_| settings.skip);
+    let prover = tree.map(|tree| Prover::new(tree, light, gbuffer, magnitude));
+    let begin = |x, y, scratch: &mut Scratch| {
+        if let Some(prover) = &prover {
+            prover.begin_tile(x, y, &mut scratch.proofs);
+        }
+    };
+    let tracer = Tracer { casters, light, gbuffer, settings, magnitude };
+    estimate_tiles(scene, light, gbuffer, progress, Scratch::default, begin, |pixel, scratch, work| {
+        match prover.as_ref().and_then(|prover| prover.prove(pixel, &mut scratch.proofs)) {
+            Some(Proof::Lit) => {
+                work.proved_lit += 1;
+                Estimate::certain(1.0)
+            }
+            Some(Proof::Dark) => {
+                work.proved_dark += 1;
+                Estimate::certain(0.0)
+            }
+            None => {
+                work.sampled += 1;
+                tracer.pixel(pixel, scratch, work)
+            }
+        }
     })
 }
 
@@ -68,7 +89,7 @@ struct Scratch {
     blocked: Vec<bool>,
     /// Per sample whether it is seen.
     seen: Vec<bool>,
-    last_cover: LastCover,
+    proofs: Memory,
 }
 
 struct Tracer<'a, O> {
@@ -83,21 +104,6 @@ struct Tracer<'a, O> {
 impl<O: Occlusion> Tracer<'_, O> {
     fn pixel(&self, pixel: usize, scratch: &mut Scratch, work: &mut Work) -> Estimate {
         let (position, normal) = (self.gbuffer.position[pixel], self.gbuffer.normal[pixel]);
-        if let Some(tree) = self.casters.tree().filter(|_| self.settings.skip) {
-            let receiver = Receiver { position, normal, magnitude: self.magnitude };
-            match prove(tree, self.light, receiver, &mut scratch.last_cover) {
-                Some(Proof::Lit) => {
-                    work.proved_lit += 1;
-                    return Estimate::certain(1.0);
-                }
-                Some(Proof::Dark) => {
-                    work.proved_dark += 1;
-                    return Estimate::certain(0.0);
-                }
-                None => {}
-            }
-        }
-        work.sampled += 1;
         let view = LightView::new(self.light, position);
         let strata = if view.is_single() {
             Strata::new(1, 1.0)

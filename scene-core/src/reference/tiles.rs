@@ -60,7 +60,7 @@ pub fn no_progress(_fraction: f32) -> ControlFlow<()> {
 
 /// Side of the tiles that threads take, in pixels: small enough to balance, large enough that neighbours' rays
 /// find the same nodes in the cache.
-const TILE: u32 = 16;
+pub(super) const TILE: u32 = 16;
 
 /// What was found for one pixel.
 #[derive(Clone, Copy)]
@@ -82,13 +82,14 @@ struct Tile {
 }
 
 /// Calls `estimate` for every pixel of `gbuffer` whose V is in question, with a thread's buffers and a tally to
-/// add to. Objects that do not receive are lit and points that the light does not reach are dark without asking.
+/// add to; `begin` is called before those of a tile, with its first column and row. Objects that do not receive are lit and points that the light does not reach are dark without asking.
 pub(super) fn estimate_tiles<B>(
     scene: &Scene,
     light: &Light,
     gbuffer: &GBuffer,
     progress: &(dyn Fn(f32) -> ControlFlow<()> + Sync),
     buffers: impl Fn() -> B + Sync + Send,
+    begin: impl Fn(u32, u32, &mut B) + Sync,
     estimate: impl Fn(usize, &mut B, &mut Work) -> Estimate + Sync,
 ) -> Result<Reference, Cancelled> {
     let tiles_x = gbuffer.width.div_ceil(TILE);
@@ -104,6 +105,7 @@ pub(super) fn estimate_tiles<B>(
         .into_par_iter()
         .map_init(buffers, |buffers, tile| {
             let mut work = Work::default();
+            begin(tile as u32 % tiles_x * TILE, tile as u32 / tiles_x * TILE, buffers);
             let one = |pixel| {
                 if !gbuffer.is_seen(pixel) {
                     None

@@ -60,7 +60,8 @@ pub fn exact_reference<C: CasterSearch + Occlusion>(
     }
     let outline = Outline::new(light).ok_or(ExactError::Light(light.kind()))?;
     let magnitude = scene.bounds().magnitude();
-    Ok(estimate_tiles(scene, light, gbuffer, progress, UnionArea::default, |pixel, hidden, _rays| {
+    let begin = |_, _, _: &mut UnionArea| {};
+    Ok(estimate_tiles(scene, light, gbuffer, progress, UnionArea::default, begin, |pixel, hidden, _work| {
         let (position, normal) = (gbuffer.position[pixel], gbuffer.normal[pixel]);
         let cone = Cone::new(&outline, shadow_origin(position, normal, magnitude), position, normal);
         hidden.clear();
