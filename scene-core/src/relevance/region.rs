@@ -1,7 +1,7 @@
 //! H = M ∩ S ∩ L: where a caster can stand that shadows what is seen.
 //!
-//! After Wimmer et al., *Light space perspective shadow maps*, section 4 (for PSM by Stamminger and Drettakis): M
-//! is the convex hull of the receivers that matter and the light, S the casters' bounds, L what the light reaches.
+//! After Stamminger and Drettakis, *Perspective shadow maps* (2002), section 4: M is the convex hull of the
+//! receivers that matter and the light, S the casters' bounds, L what the light reaches.
 //! Every segment from a receiver to a point of the light lies in M. Differences: M starts from the receivers in
 //! view instead of all of the view's volume, and the light may have an extent.
 
