@@ -145,10 +145,10 @@ fn classify<S: Simd>(simd: S, rays: &Rays<OUTLINE>, found: &Candidates<S>) -> (u
         waiting &= waiting - 1;
         let x = f32x8::splat(simd, rays.slopes[0][ray]);
         let y = f32x8::splat(simd, rays.slopes[1][ray]);
-        for edge in 0..3 {
+        for (edge, outside) in outside.iter_mut().enumerate() {
             let [a, b, c] = found.edges[edge];
             let inside = x.mul_add(a, y.mul_add(b, c));
-            outside[edge] &= inside.simd_lt(0.0).to_bitmask() as u32;
+            *outside &= inside.simd_lt(0.0).to_bitmask() as u32;
             covering &= inside.simd_gt(found.twice_bound[edge]).to_bitmask() as u32;
         }
         if rays.finite {
