@@ -64,9 +64,9 @@ impl Bvh {
                 let outside = side.misses_boxes(&node.lo, &node.hi);
                 missed = std::array::from_fn(|lane| missed[lane] | outside[lane]);
             }
-            for lane in 0..node.count as usize {
-                if !missed[lane] {
-                    links[height] = node.links[lane];
+            for (&link, missed) in node.links.iter().zip(missed).take(node.count as usize) {
+                if !missed {
+                    links[height] = link;
                     height += 1;
                 }
             }
