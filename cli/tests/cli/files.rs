@@ -128,10 +128,11 @@ fn exact_truth_is_what_sampled_truth_tends_to() {
     let (_, error) = bench.npy::<f32>("sampled/std_error.npy");
     let (_, valid) = bench.npy::<bool>("exact/valid.npy");
     for pixel in (0..exact.len()).filter(|&pixel| valid[pixel]) {
-        // Six standard errors: a false alarm once in 10⁸ pixels. Where all samples agree the error is told as if
-        // one stratum were split.
+        // Six standard errors: a false alarm once in 10⁸ pixels. A pixel proved wholly lit or dark has none; areas
+        // are sums in f64, so what exact truth leaves there is below the rounding of 1 in f32.
         let difference = (exact[pixel] - sampled[pixel]).abs();
-        assert!(difference <= 6.0 * error[pixel], "pixel {pixel}: {difference} at {}", error[pixel]);
+        let bound = 6.0 * error[pixel] + f32::EPSILON;
+        assert!(difference <= bound, "pixel {pixel}: {difference} at {}", error[pixel]);
     }
     assert_eq!(bench.json("exact/report.json")["variant"], "exact");
 }
