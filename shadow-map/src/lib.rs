@@ -1,19 +1,22 @@
 #![doc = include_str!("../README.md")]
 
 pub mod cpu;
+mod hard;
+pub mod light_maps;
 pub mod light_views;
 mod params;
 pub mod receiver_plane;
 mod technique;
 pub mod view_casters;
 
+use std::fmt::Debug;
+
 use glam::Vec3;
-use rayon::prelude::*;
-use scene_core::geometry::Object;
 use scene_core::relevance::{self, Backdrops, CasterChunks, RelevantCasters};
 use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
 
-use cpu::{Lookup, ShadowMapView};
+use hard::Hard;
+use light_maps::{LightMaps, ShadowMapView};
 use light_views::LightView;
 pub use params::{ShadowMapParams, Variant};
 pub use technique::Factory;
@@ -24,14 +27,27 @@ pub struct ShadowMap {
     params: ShadowMapParams,
 }
 
-/// The maps of one light, borrowing the scene they were made from.
+/// A light, prepared by one of the variants, borrowing the scene it shines on.
 #[derive(Debug)]
 pub struct PreparedShadowMap<'a> {
-    scene: &'a Scene,
-    light: Light,
-    maps: Vec<ShadowMapView>,
-    backdrops: Vec<&'a Object>,
-    tolerance: f32,
+    variant: Box<dyn PreparedVariant + 'a>,
+}
+
+/// What a variant has prepared. Each is a type in the file named after it; this is all that the crate asks of it.
+pub(crate) trait PreparedVariant: Debug + Send + Sync {
+    /// Fills `visibility`, which has the G-buffer's size: V where a surface is seen, NaN elsewhere.
+    fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage, report: &mut Report);
+
+    /// V at free points; NaN for a point that is not finite.
+    fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32], report: &mut Report);
+
+    /// The depth maps with a triangle a texel, one a view; none where the variant keeps none.
+    fn maps(&self) -> &[ShadowMapView];
+
+    /// Whether it holds for any camera.
+    fn survives_camera(&self) -> bool {
+        true
+    }
 }
 
 impl ShadowMap {
@@ -80,49 +96,28 @@ impl ShadowMap {
         choose: impl FnOnce(&Backdrops<'a>, &[LightView], &mut Report) -> Option<RelevantCasters>,
     ) -> (PreparedShadowMap<'a>, Report) {
         let mut report = Report::default();
-        let tolerance = receiver_plane::plane_tolerance(scene.bounds(), light);
-        let (casters, views) = report.time("prepare.views", |_| {
-            let casters = relevance::told_apart(scene, light, tolerance);
-            let views = light_views::light_views(scene, light, &casters.drawn, self.params.skip);
-            (casters, views)
-        });
-        report.skip("casters", casters.backdrops.len() as u64);
-        report.skip("faces", views.skipped_faces);
-        let chosen = choose(&casters, &views.views, &mut report);
-        let ranges = match chosen {
-            Some(chosen) => chosen.ranges,
-            None => casters.drawn.iter().map(|object| object.triangles.clone()).collect(),
+        let variant: Box<dyn PreparedVariant + 'a> = match self.params.variant {
+            Variant::Hard => Box::new(Hard(LightMaps::draw(scene, light, &self.params, &mut report, choose))),
         };
-        let maps = report
-            .time("prepare.maps", |_| cpu::render_maps(scene, &ranges, &views.views, self.params.map_size));
-        let texels = u64::from(self.params.map_size) * u64::from(self.params.map_size);
-        // A depth and a triangle index a texel.
-        report.bytes = maps.len() as u64 * texels * 8;
-        let backdrops = casters.backdrops;
-        (PreparedShadowMap { scene, light: *light, maps, backdrops, tolerance }, report)
+        (PreparedShadowMap { variant }, report)
     }
 }
 
 impl PreparedShadowMap<'_> {
-    fn lookup(&self) -> Lookup<'_> {
-        Lookup {
-            scene: self.scene,
-            light: &self.light,
-            maps: &self.maps,
-            backdrops: &self.backdrops,
-            tolerance: self.tolerance,
-        }
-    }
-
     /// The maps, one a view.
     pub fn maps(&self) -> &[ShadowMapView] {
-        &self.maps
+        self.variant.maps()
+    }
+
+    /// Whether the preparation holds for any camera.
+    pub fn survives_camera(&self) -> bool {
+        self.variant.survives_camera()
     }
 
     /// Fills `visibility`, which must have the G-buffer's size: V where a surface is seen, NaN elsewhere.
     pub fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Report {
         let mut report = Report::default();
-        report.time("shade.lookup", |_| cpu::shade_hard(&self.lookup(), gbuffer, visibility));
+        self.variant.shade(gbuffer, visibility, &mut report);
         report
     }
 
@@ -130,10 +125,7 @@ impl PreparedShadowMap<'_> {
     /// longer one has more is left alone.
     pub fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Report {
         let mut report = Report::default();
-        let lookup = self.lookup();
-        report.time("shade.lookup", |_| {
-            visibility.par_iter_mut().zip(points).for_each(|(v, &point)| *v = lookup.hard_at(point));
-        });
+        self.variant.visibility_at(points, visibility, &mut report);
         report
     }
 }

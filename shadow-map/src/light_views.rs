@@ -28,12 +28,12 @@ pub struct LightView {
     /// World to the light's clip space; x and y of the map lie in [−w, w], depth is reversed.
     pub projection_from_world: Mat4,
     /// Map back to world, for the point a texel's centre and depth stand for.
-    unproject: Unprojection,
+    pub(crate) unproject: Unprojection,
 }
 
 /// From normalised device coordinates back to world space, without inverting a matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Unprojection {
+pub(crate) enum Unprojection {
     /// `origin + x·ndc.x + y·ndc.y + z·depth`.
     Parallel { origin: Vec3, x: Vec3, y: Vec3, z: Vec3 },
     /// `eye + (forward + x·ndc.x + y·ndc.y)·near/depth`.

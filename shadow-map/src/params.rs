@@ -14,6 +14,12 @@ pub enum Variant {
 }
 
 impl Variant {
+    /// Every variant, in the order of the tables.
+    pub const ALL: [Self; 1] = [Self::Hard];
+
+    /// The names, in the same order.
+    const NAMES: &'static [&'static str] = &["hard"];
+
     /// The name in settings and reports.
     pub fn name(self) -> &'static str {
         match self {
@@ -39,14 +45,13 @@ pub struct ShadowMapParams {
 }
 
 impl ShadowMapParams {
-    const fn with_map_size(map_size: u32) -> Self {
-        Self { variant: Variant::Hard, map_size, skip: true, view_dependent: false }
-    }
+    /// The settings that presets are told apart from.
+    const DEFAULT: Self = Self { variant: Variant::Hard, map_size: 1024, skip: true, view_dependent: false };
 }
 
 impl Default for ShadowMapParams {
     fn default() -> Self {
-        Self::with_map_size(1024)
+        Self::DEFAULT
     }
 }
 
@@ -56,7 +61,7 @@ impl Params for ShadowMapParams {
     const SETTINGS: &'static [Setting] = &[
         Setting {
             name: "variant",
-            kind: SettingKind::Choice(&["hard"]),
+            kind: SettingKind::Choice(Variant::NAMES),
             unit: "",
             doc: "the algorithm: hard compares one texel a pixel",
         },
@@ -80,11 +85,12 @@ impl Params for ShadowMapParams {
         },
     ];
 
+    // A ladder for each variant; rungs are named after it, those of `hard` after nothing.
     const PRESETS: &'static [Preset<Self>] = &[
-        Preset { name: "low", params: Self::with_map_size(512) },
-        Preset { name: "medium", params: Self::with_map_size(1024) },
-        Preset { name: "high", params: Self::with_map_size(2048) },
-        Preset { name: "ultra", params: Self::with_map_size(4096) },
+        Preset { name: "low", params: Self { map_size: 512, ..Self::DEFAULT } },
+        Preset { name: "medium", params: Self { map_size: 1024, ..Self::DEFAULT } },
+        Preset { name: "high", params: Self { map_size: 2048, ..Self::DEFAULT } },
+        Preset { name: "ultra", params: Self { map_size: 4096, ..Self::DEFAULT } },
     ];
 }
 
@@ -95,6 +101,15 @@ mod tests {
     #[test]
     fn metadata_matches_the_struct() {
         assert_eq!(ShadowMapParams::check_metadata(), Ok(()));
+    }
+
+    #[test]
+    fn variants_have_the_names_that_are_listed() {
+        assert!(Variant::ALL.map(Variant::name).iter().eq(Variant::NAMES));
+        for variant in Variant::ALL {
+            let set = [("variant".to_owned(), variant.name().to_owned())];
+            assert_eq!(ShadowMapParams::from_overrides(None, &set).unwrap().variant, variant);
+        }
     }
 
     #[test]

@@ -71,7 +71,7 @@ impl PreparedShadow for PreparedShadowMap<'_> {
     }
 
     fn survives_camera(&self) -> bool {
-        true
+        PreparedShadowMap::survives_camera(self)
     }
 }
 

@@ -1,0 +1,74 @@
+//! `hard`: one comparison a receiver (Williams 1978), by the questions of [`receiver_plane`](crate::receiver_plane).
+//!
+//! Limits: V is 0 or 1, an extended light is taken for its centre, and shadow edges are jagged by the map's
+//! texels.
+
+use glam::Vec3;
+use scene_core::raster::DEPTH_POSITION_ERROR;
+use scene_core::{GBuffer, Report, VisibilityImage};
+
+use crate::PreparedVariant;
+use crate::cpu;
+use crate::light_maps::{LightMaps, Receiver, ShadowMapView};
+use crate::receiver_plane::{is_behind, is_near, meets, rises_above};
+
+impl LightMaps<'_> {
+    /// V of one receiver, 0 or 1.
+    #[inline]
+    pub fn hard(&self, receiver: &Receiver) -> f32 {
+        let Receiver { point, normal, tolerance, .. } = *receiver;
+        let light = self.light.center();
+        let shadowed = self.occluder(point).is_some_and(|occluder| {
+            let corners = self.scene.corners(occluder.triangle);
+            let snapping = occluder.texel * DEPTH_POSITION_ERROR;
+            rises_above(occluder.point, point, normal, tolerance + snapping)
+                && is_behind(corners, point, light, tolerance)
+                && (!is_near(occluder.point, point, normal, light, occluder.texel)
+                    || meets(corners, point, light))
+        });
+        if shadowed { 0.0 } else { 1.0 }
+    }
+
+    /// V at a free point, which has no surface of its own: shadowed if the stored surface is nearer to the
+    /// light and the point lies behind it. NaN for a point that is not finite.
+    pub fn hard_at(&self, point: Vec3) -> f32 {
+        if !point.is_finite() {
+            return f32::NAN;
+        }
+        if !self.light.reaches(point) {
+            return 0.0;
+        }
+        let (to_light, _) = self.light.center().ray_from(point);
+        let shadowed = self.occluder(point).is_some_and(|occluder| {
+            (occluder.point - point).dot(to_light) > 0.0
+                && is_behind(
+                    self.scene.corners(occluder.triangle),
+                    point,
+                    self.light.center(),
+                    self.tolerance,
+                )
+        });
+        if shadowed || self.is_behind_backdrop(point) { 0.0 } else { 1.0 }
+    }
+}
+
+/// The variant: its maps are all there is to it.
+#[derive(Debug)]
+pub(crate) struct Hard<'a>(pub(crate) LightMaps<'a>);
+
+impl PreparedVariant for Hard<'_> {
+    fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage, report: &mut Report) {
+        report.time("shade.lookup", |_| {
+            cpu::shade_pixels(&self.0, gbuffer, visibility, |receiver| self.0.hard(receiver));
+        });
+    }
+
+    fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32], report: &mut Report) {
+        report
+            .time("shade.lookup", |_| cpu::answer_points(points, visibility, |point| self.0.hard_at(point)));
+    }
+
+    fn maps(&self) -> &[ShadowMapView] {
+        &self.0.maps
+    }
+}

@@ -1,0 +1,140 @@
+//! The maps of one light and what their texels stand for: what every variant looks receivers up in.
+
+use std::ops::Range;
+
+use glam::{Vec2, Vec3};
+use scene_core::geometry::Object;
+use scene_core::light::LightPoint;
+use scene_core::raster::DepthMap;
+use scene_core::relevance::{self, Backdrops, RelevantCasters};
+use scene_core::{Light, Report, Scene};
+
+use crate::ShadowMapParams;
+use crate::cpu;
+use crate::light_views::{self, LightView};
+use crate::receiver_plane::{is_behind, meets, plane_tolerance};
+
+/// What the light sees through one view: depth and triangle a texel.
+#[derive(Clone, Debug)]
+pub struct ShadowMapView {
+    /// The projection.
+    pub view: LightView,
+    /// Reversed depth; 0 where there is no caster.
+    pub map: DepthMap,
+    /// The triangle seen, as an index into [`Scene::triangles`].
+    pub triangles: Vec<u32>,
+}
+
+/// The maps of one light.
+#[derive(Clone, Debug)]
+pub struct LightMaps<'a> {
+    /// Geometry, for the planes of stored triangles.
+    pub scene: &'a Scene,
+    /// The light.
+    pub light: Light,
+    /// Its maps.
+    pub maps: Vec<ShadowMapView>,
+    /// Casters that are in no map because no surface lies behind them; a free point may.
+    pub backdrops: Vec<&'a Object>,
+    /// [`plane_tolerance`].
+    pub tolerance: f32,
+}
+
+/// A surface point that a camera sees and that faces the light's centre.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// Where it is, world space.
+    pub point: Vec3,
+    /// Unit normal on the side that the light shines on.
+    pub normal: Vec3,
+    /// The object it is on, as an index into [`Scene::objects`].
+    pub object: u32,
+    /// Distance from a plane below which it counts as on it, in scene units.
+    pub tolerance: f32,
+}
+
+/// A stored surface point: what the light sees in the texel that a receiver falls into.
+#[derive(Clone, Copy, Debug)]
+pub struct Occluder {
+    /// The point at the texel's centre, world space.
+    pub point: Vec3,
+    /// Its triangle, as an index into [`Scene::triangles`].
+    pub triangle: usize,
+    /// Diagonal of the texel at the point's distance, world units.
+    pub texel: f32,
+}
+
+impl<'a> LightMaps<'a> {
+    /// `prepare.views` and `prepare.maps`: chooses the views of `light` and draws them. `choose` may narrow the
+    /// casters down to those that matter.
+    pub fn draw(
+        scene: &'a Scene,
+        light: &Light,
+        params: &ShadowMapParams,
+        report: &mut Report,
+        choose: impl FnOnce(&Backdrops<'a>, &[LightView], &mut Report) -> Option<RelevantCasters>,
+    ) -> Self {
+        let tolerance = plane_tolerance(scene.bounds(), light);
+        let (casters, views) = report.time("prepare.views", |_| {
+            let casters = relevance::told_apart(scene, light, tolerance);
+            let views = light_views::light_views(scene, light, &casters.drawn, params.skip);
+            (casters, views)
+        });
+        report.skip("casters", casters.backdrops.len() as u64);
+        report.skip("faces", views.skipped_faces);
+        let ranges: Vec<Range<usize>> = match choose(&casters, &views.views, report) {
+            Some(chosen) => chosen.ranges,
+            None => casters.drawn.iter().map(|object| object.triangles.clone()).collect(),
+        };
+        let maps =
+            report.time("prepare.maps", |_| cpu::render_maps(scene, &ranges, &views.views, params.map_size));
+        let backdrops = casters.backdrops;
+        let maps = Self { scene, light: *light, maps, backdrops, tolerance };
+        report.bytes += maps.bytes();
+        maps
+    }
+
+    /// Bytes of the texels: a depth and a triangle index each.
+    pub fn bytes(&self) -> u64 {
+        self.maps.iter().map(|map| map.map.depth.len() as u64 * 8).sum()
+    }
+
+    /// The surface that the light sees in the receiver's texel; `None` if there is none or no map holds the
+    /// receiver.
+    #[inline]
+    pub fn occluder(&self, receiver: Vec3) -> Option<Occluder> {
+        let (map, ndc) = self.maps.iter().find_map(|m| m.view.project(receiver).map(|ndc| (m, ndc)))?;
+        let (size, count) = (map.map.width as f32, map.map.width as usize);
+        // Row 0 is on top, as in every image. NDC 1 belongs to the last texel.
+        let column = (((ndc.x * 0.5 + 0.5) * size) as usize).min(count - 1);
+        let row = (((0.5 - ndc.y * 0.5) * size) as usize).min(count - 1);
+        let depth = map.map.depth[row * count + column];
+        let center = Vec2::new(column as f32 + 0.5, row as f32 + 0.5) * (2.0 / size);
+        (depth > 0.0).then(|| Occluder {
+            point: map.view.unproject(Vec2::new(center.x - 1.0, 1.0 - center.y), depth),
+            triangle: map.triangles[row * count + column] as usize,
+            texel: map.view.half_diagonal(depth) * (2.0 / size),
+        })
+    }
+
+    /// Whether `normal` at `point` is turned to the light's centre and light is sent there at all.
+    #[inline]
+    pub fn faces(&self, point: Vec3, normal: Vec3) -> bool {
+        let faces_light = match self.light.center() {
+            LightPoint::At(place) => normal.dot(place - point) > 0.0,
+            LightPoint::Towards(direction) => normal.dot(direction) > 0.0,
+        };
+        faces_light && self.light.reaches(point)
+    }
+
+    /// Whether a backdrop hides the light from a free point, triangle by triangle: backdrops are few and flat,
+    /// and only points beyond all of the scene are behind one.
+    pub fn is_behind_backdrop(&self, point: Vec3) -> bool {
+        let light = self.light.center();
+        let mut triangles = self.backdrops.iter().flat_map(|object| object.triangles.clone());
+        triangles.any(|triangle| {
+            let corners = self.scene.corners(triangle);
+            is_behind(corners, point, light, self.tolerance) && meets(corners, point, light)
+        })
+    }
+}
