@@ -16,6 +16,18 @@ pub struct Report {
     pub bytes: u64,
     /// What was skipped → how many of it.
     pub skipped: BTreeMap<String, u64>,
+    /// What it ran on; none on the CPU. Filled in by who owns the device.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gpu: Option<GpuUse>,
+}
+
+/// The GPU that did the work.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct GpuUse {
+    /// Name, interface and driver.
+    pub adapter: String,
+    /// Features used beyond what every device has.
+    pub features: Vec<String>,
 }
 
 impl Report {
@@ -41,6 +53,9 @@ impl Report {
             self.skip(what, *count);
         }
         self.bytes = self.bytes.max(other.bytes);
+        if self.gpu.is_none() {
+            self.gpu.clone_from(&other.gpu);
+        }
     }
 
     /// Milliseconds of all stages whose name starts with `prefix`.

@@ -1,6 +1,8 @@
 #![doc = include_str!("../README.md")]
 
 pub mod cpu;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 mod hard;
 pub mod light_maps;
 pub mod light_views;

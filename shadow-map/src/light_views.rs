@@ -99,6 +99,12 @@ impl LightView {
         inside.then(|| Vec2::new(clip.x, clip.y) / clip.w)
     }
 
+    /// The parts of [`unproject`](Self::unproject), for shaders.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn unprojection(&self) -> Unprojection {
+        self.unproject
+    }
+
     /// Half the longer diagonal of the map in world units at reversed depth `depth`: what one unit of NDC along
     /// both axes is at most. Times 2/`map_size` it is the diagonal of a texel.
     #[inline]

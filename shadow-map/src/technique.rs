@@ -1,6 +1,10 @@
 //! The trait's implementation, nothing else.
 
 use glam::Vec3;
+#[cfg(feature = "gpu")]
+use scene_core::Camera;
+#[cfg(feature = "gpu")]
+use scene_core::gpu::{GpuGBuffer, GpuShadowQuery, GpuShadowTechnique, Recorder};
 use scene_core::relevance::CasterChunks;
 use scene_core::technique::{
     Capability, Description, Params, PreparedShadow, Setting, SettingsError, ShadowQuery, ShadowTechnique,
@@ -8,6 +12,8 @@ use scene_core::technique::{
 };
 use scene_core::{GBuffer, Report, VisibilityImage};
 
+#[cfg(feature = "gpu")]
+use crate::gpu::ShadowMapOnGpu;
 use crate::{PreparedShadowMap, ShadowMap, ShadowMapParams};
 
 impl ShadowTechnique for ShadowMap {
@@ -23,7 +29,8 @@ impl ShadowTechnique for ShadowMap {
                 CENTRE
             }
             Capability::AlphaMask | Capability::TriangleSoup | Capability::FreePoints => Support::Exact,
-            Capability::Gpu => Support::Unsupported("the CPU path is the only one so far"),
+            Capability::Gpu if cfg!(feature = "gpu") => Support::Exact,
+            Capability::Gpu => Support::Unsupported("built without the feature 'gpu'"),
         };
         Description {
             summary: SUMMARY,
@@ -51,6 +58,40 @@ impl ShadowTechnique for ShadowMap {
         let (prepared, rest) = self.prepare_for_view(query.scene, query.light, query.camera, &chunks);
         report.merge(&rest);
         Ok((Box::new(ForOneCamera(prepared)), report))
+    }
+
+    #[cfg(feature = "gpu")]
+    fn gpu(
+        &self,
+        device: &wgpu::Device,
+        visibility: wgpu::TextureFormat,
+    ) -> Result<Box<dyn GpuShadowTechnique>, TechniqueError> {
+        Ok(Box::new(ShadowMapOnGpu::new(device, self.params, visibility)?))
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl GpuShadowTechnique for ShadowMapOnGpu {
+    fn prepare(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        query: &GpuShadowQuery<'_>,
+    ) -> Result<Report, TechniqueError> {
+        ShadowMapOnGpu::prepare(self, recorder, query)
+    }
+
+    fn shade(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        camera: &Camera,
+        gbuffer: &GpuGBuffer<'_>,
+        visibility: &wgpu::TextureView,
+    ) -> Result<Report, TechniqueError> {
+        ShadowMapOnGpu::shade(self, recorder, camera, gbuffer, visibility)
+    }
+
+    fn survives_camera(&self) -> bool {
+        true
     }
 }
 

@@ -94,6 +94,16 @@ impl Gpu {
         format!("{} ({:?}, {})", info.name, info.backend, driver.trim())
     }
 
+    /// Features in use beyond what every device has, as wgpu names them.
+    pub fn features(&self) -> Vec<String> {
+        self.device.features().iter_names().map(|(name, _)| name.to_owned()).collect()
+    }
+
+    /// Whether it is no GPU but a program that computes as one would, on the CPU.
+    pub fn is_software(&self) -> bool {
+        self.adapter.device_type == wgpu::DeviceType::Cpu
+    }
+
     /// Fails if the device is lost or something failed outside of [`Gpu::scoped`].
     ///
     /// # Errors

@@ -5,8 +5,9 @@ use std::ops::Range;
 
 use glam::Mat4;
 
+use super::held::{HeldBuffer, HeldGroup, binding};
 use super::layout::DepthUniform;
-use super::pipeline::{RenderPipelineParts, render_pipeline, shader_module, uniform_group, uniform_layout};
+use super::pipeline::{RenderPipelineParts, render_pipeline, shader_module};
 use super::scene::SceneBindings;
 use super::{GpuScene, Recorder, shaders};
 use crate::GBuffer;
@@ -54,7 +55,9 @@ impl<'a> DepthTarget<'a> {
 #[derive(Debug)]
 pub struct DepthPass {
     ids: DepthIds,
-    view_layout: wgpu::BindGroupLayout,
+    view_group: HeldGroup,
+    /// What the targets were drawn with last time, in their order.
+    views: Vec<(HeldBuffer, HeldGroup)>,
     bindings: SceneBindings,
     solid: wgpu::RenderPipeline,
     cutout: wgpu::RenderPipeline,
@@ -66,7 +69,7 @@ impl DepthPass {
     pub fn new(device: &wgpu::Device, ids: DepthIds, cull: Option<wgpu::Face>) -> Self {
         let module = shader_module(device, "depth_pass", shaders::DEPTH_PASS);
         let stages = wgpu::ShaderStages::VERTEX_FRAGMENT;
-        let view_layout = uniform_layout(device, stages);
+        let view_group = HeldGroup::new(device, "depth view", stages, &[binding::UNIFORM]);
         let bindings = SceneBindings::new(device, stages);
         let targets: &[wgpu::TextureFormat] = match ids {
             DepthIds::None => &[],
@@ -77,7 +80,7 @@ impl DepthPass {
             module: &module,
             vertex: "depth_vertex",
             fragment: None,
-            groups: &[&view_layout],
+            groups: &[view_group.layout()],
             vertex_buffers: &[],
             targets,
             cull,
@@ -87,8 +90,8 @@ impl DepthPass {
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &wgpu::vertex_attr_array![0 => Float32x3],
         };
-        let pulled = [&view_layout, &bindings.triangles_layout];
-        let masked = [&view_layout, &bindings.triangles_layout, &bindings.cutouts_layout];
+        let pulled = [view_group.layout(), &bindings.triangles_layout];
+        let masked = [view_group.layout(), &bindings.triangles_layout, &bindings.cutouts_layout];
         let (solid_fragment, cutout_fragment) = match ids {
             DepthIds::None => (None, "cutout_fragment"),
             DepthIds::Object => (Some("solid_object_fragment"), "cutout_object_fragment"),
@@ -104,7 +107,7 @@ impl DepthPass {
         let parts = RenderPipelineParts { vertex: "cutout_vertex", groups: &masked, ..parts };
         let cutout =
             render_pipeline(device, &RenderPipelineParts { fragment: Some(cutout_fragment), ..parts });
-        Self { ids, view_layout, bindings, solid, cutout }
+        Self { ids, view_group, views: Vec::new(), bindings, solid, cutout }
     }
 
     /// Records one pass a target: the casters of `scene`. All targets are timed as `stage`.
@@ -117,18 +120,34 @@ impl DepthPass {
         scene: &GpuScene<'_>,
         targets: &[DepthTarget<'_>],
     ) {
-        let groups = self.bindings.groups(recorder.device, scene);
-        for target in targets {
+        let device = recorder.device;
+        let groups = self.bindings.groups(device, scene);
+        // Without masks to read, objects that claim one are drawn whole.
+        let is_masked = |id: u32| scene.objects[id as usize].has_mask && groups.cutouts.is_some();
+        // Near what is drawn: its middle, or for an empty scene the world's origin.
+        let middle = scene.bounds.center();
+        let origin = if middle.is_finite() { middle } else { glam::Vec3::ZERO };
+        // Targets mostly share their ranges.
+        let mut drawn: Option<(Option<&[Range<u32>]>, Draws)> = None;
+        for (index, target) in targets.iter().enumerate() {
             let ids = match (self.ids, target.ids) {
                 (DepthIds::None, _) => None,
                 (_, Some(ids)) => Some(ids),
                 (_, None) => continue,
             };
-            // Near what is drawn: its middle, or for an empty scene the world's origin.
-            let middle = scene.bounds.center();
-            let origin = if middle.is_finite() { middle } else { glam::Vec3::ZERO };
-            let uniform = recorder.uniform("depth view", &DepthUniform::new(target.clip_from_world, origin));
-            let view_group = uniform_group(recorder.device, &self.view_layout, &uniform);
+            let draws = match &mut drawn {
+                Some((triangles, draws)) if *triangles == target.triangles => draws,
+                drawn => &mut drawn.insert((target.triangles, draws(scene, target.triangles, self.ids, is_masked))).1,
+            };
+            if self.views.len() <= index {
+                self.views.resize_with(index + 1, || {
+                    (HeldBuffer::uniform("depth view"), self.view_group.another())
+                });
+            }
+            let (uniform, group) = &mut self.views[index];
+            let uniform =
+                uniform.get(device, bytemuck::bytes_of(&DepthUniform::new(target.clip_from_world, origin)));
+            let view_group = group.get(device, &[uniform.into()]);
             let span = recorder.stage(stage);
             let mut pass = begin(recorder.encoder, target, ids, &span);
             pass.set_bind_group(0, &view_group, &[]);
@@ -136,25 +155,23 @@ impl DepthPass {
                 pass.set_bind_group(1, &groups.triangles, &[]);
             }
             pass.set_pipeline(&self.solid);
-            // Without masks to read, objects that claim one are drawn whole.
-            let is_masked = |id: u32| scene.objects[id as usize].has_mask && groups.cutouts.is_some();
-            let draws = casters(scene, target.triangles);
             if self.ids == DepthIds::None {
                 pass.set_vertex_buffer(0, scene.positions.slice(..));
                 pass.set_index_buffer(scene.triangles.slice(..), wgpu::IndexFormat::Uint32);
-                for range in merged(draws.iter().filter(|(_, id)| !is_masked(*id)).map(|(r, _)| r.clone())) {
-                    pass.draw_indexed(3 * range.start..3 * range.end, 0, 0..1);
-                }
-            } else {
-                for (range, id) in draws.iter().filter(|(_, id)| !is_masked(*id)) {
-                    pass.draw(3 * range.start..3 * range.end, *id..id + 1);
+            }
+            for (range, id) in &draws.solid {
+                let vertices = 3 * range.start..3 * range.end;
+                if self.ids == DepthIds::None {
+                    pass.draw_indexed(vertices, 0, 0..1);
+                } else {
+                    pass.draw(vertices, *id..id + 1);
                 }
             }
             let Some(cutouts) = &groups.cutouts else { continue };
             pass.set_pipeline(&self.cutout);
             pass.set_bind_group(1, &groups.triangles, &[]);
             pass.set_bind_group(2, cutouts, &[]);
-            for (range, id) in draws.iter().filter(|(_, id)| is_masked(*id)) {
+            for (range, id) in &draws.masked {
                 pass.draw(3 * range.start..3 * range.end, *id..id + 1);
             }
         }
@@ -200,32 +217,49 @@ fn begin<'e>(
     pass
 }
 
-/// Ranges of casters within `filter`, each of one object, with its id.
-fn casters(scene: &GpuScene<'_>, filter: Option<&[Range<u32>]>) -> Vec<(Range<u32>, u32)> {
-    let everything = 0..u32::MAX;
-    let filter = filter.unwrap_or(std::slice::from_ref(&everything));
-    let objects = scene.objects.iter().zip(0..).filter(|(object, _)| object.flags.casts);
-    objects
-        .flat_map(|(object, id)| {
-            filter.iter().map(move |range| {
-                let start = range.start.max(object.triangles.start);
-                (start..range.end.min(object.triangles.end), id)
-            })
-        })
-        .filter(|(range, _)| !range.is_empty())
-        .collect()
+/// Draw calls: triangles, and the object that they are drawn as.
+#[derive(Debug, Default)]
+struct Draws {
+    solid: Vec<(Range<u32>, u32)>,
+    masked: Vec<(Range<u32>, u32)>,
 }
 
-/// Ranges that follow one another as one.
-fn merged(ranges: impl Iterator<Item = Range<u32>>) -> Vec<Range<u32>> {
-    let mut merged: Vec<Range<u32>> = Vec::new();
-    for range in ranges {
-        match merged.last_mut() {
-            Some(last) if last.end == range.start => last.end = range.end,
-            _ => merged.push(range),
+/// The casters of `scene` within `filter`. Solid ones that follow one another are drawn at once where nobody asks which
+/// object they are.
+fn draws(
+    scene: &GpuScene<'_>,
+    filter: Option<&[Range<u32>]>,
+    ids: DepthIds,
+    is_masked: impl Fn(u32) -> bool,
+) -> Draws {
+    let mut casters: Vec<(Range<u32>, u32)> = scene
+        .objects
+        .iter()
+        .zip(0..)
+        .filter(|(object, _)| object.flags.casts && !object.triangles.is_empty())
+        .map(|(object, id)| (object.triangles.clone(), id))
+        .collect();
+    casters.sort_unstable_by_key(|(triangles, _)| triangles.start);
+    let everything = 0..u32::MAX;
+    let mut draws = Draws::default();
+    for range in filter.unwrap_or(std::slice::from_ref(&everything)) {
+        let first = casters.partition_point(|(triangles, _)| triangles.end <= range.start);
+        for (triangles, id) in casters[first..].iter().take_while(|(t, _)| t.start < range.end) {
+            let part = triangles.start.max(range.start)..triangles.end.min(range.end);
+            if part.is_empty() {
+                continue;
+            }
+            if is_masked(*id) {
+                draws.masked.push((part, *id));
+                continue;
+            }
+            match draws.solid.last_mut() {
+                Some((last, _)) if ids != DepthIds::Object && last.end == part.start => last.end = part.end,
+                _ => draws.solid.push((part, *id)),
+            }
         }
     }
-    merged
+    draws
 }
 
 #[cfg(test)]
@@ -233,8 +267,38 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_that_follow_are_drawn_at_once() {
-        assert_eq!(merged([0..4, 4..6, 8..9].into_iter()), [0..6, 8..9]);
-        assert!(merged(std::iter::empty()).is_empty());
+    fn what_follows_is_drawn_at_once_unless_objects_are_asked_for() {
+        let Some(gpu) = crate::gpu::testing::gpu() else { return };
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: 12,
+            usage: wgpu::BufferUsages::STORAGE,
+            mapped_at_creation: false,
+        });
+        let object = |triangles: Range<u32>, casts| crate::gpu::GpuObject {
+            triangles,
+            bounds: crate::geometry::Aabb::EMPTY,
+            flags: crate::geometry::ObjectFlags { casts, ..Default::default() },
+            has_mask: false,
+        };
+        // In any order, one that does not cast, one empty.
+        let objects = [object(6..9, true), object(0..4, true), object(4..6, true), object(9..9, true), object(9..12, false)];
+        let scene = GpuScene {
+            positions: &buffer,
+            triangles: &buffer,
+            objects: &objects,
+            bounds: crate::geometry::Aabb::EMPTY,
+            cutouts: None,
+            geometry: None,
+        };
+        let solid = |filter: Option<&[Range<u32>]>, ids, masked: u32| {
+            let draws = draws(&scene, filter, ids, |id| id == masked);
+            (draws.solid, draws.masked)
+        };
+        assert_eq!(solid(None, DepthIds::Triangle, 9), (vec![(0..9, 1)], vec![]));
+        assert_eq!(solid(None, DepthIds::Object, 9), (vec![(0..4, 1), (4..6, 2), (6..9, 0)], vec![]));
+        assert_eq!(solid(None, DepthIds::None, 2), (vec![(0..4, 1), (6..9, 0)], vec![(4..6, 2)]));
+        let some = [2..5, 8..40];
+        assert_eq!(solid(Some(&some), DepthIds::Triangle, 9), (vec![(2..5, 1), (8..9, 0)], vec![]));
     }
 }

@@ -52,6 +52,16 @@ pub enum GpuError {
         /// The adapter's limit.
         limit: u64,
     },
+    /// More of something than the device has.
+    #[error("{value} {what} are more than this device takes: at most {limit}")]
+    Beyond {
+        /// What.
+        what: &'static str,
+        /// How many were asked for.
+        value: u32,
+        /// The device's limit.
+        limit: u32,
+    },
     /// The driver or wgpu refused something: a bug of the caller's or of this crate.
     #[error("{what}: {message}")]
     Validation {
@@ -72,6 +82,14 @@ impl GpuError {
     /// Whether there is no usable GPU at all, rather than one that failed.
     pub fn is_missing(&self) -> bool {
         matches!(self, Self::TurnedOff | Self::NoAdapter | Self::NoSuchAdapter { .. } | Self::Device { .. })
+    }
+
+    /// Checks a number against a limit of the device.
+    ///
+    /// # Errors
+    /// [`GpuError::Beyond`].
+    pub fn within(what: &'static str, value: u32, limit: u32) -> Result<(), Self> {
+        if value > limit { Err(Self::Beyond { what, value, limit }) } else { Ok(()) }
     }
 
     pub(super) fn from_wgpu(what: &str, error: &wgpu::Error) -> Self {

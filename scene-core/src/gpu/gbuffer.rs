@@ -4,8 +4,11 @@
 //! depth: with the pixel's ray it gives the position to a few ulps in 4 bytes, where a reversed depth that is
 //! interpolated along a large triangle loses digits with distance.
 
+use glam::Vec4;
+
+use super::held::{HeldBuffer, HeldGroup, binding};
 use super::layout::CameraUniform;
-use super::pipeline::{RenderPipelineParts, render_pipeline, shader_module, uniform_group, uniform_layout};
+use super::pipeline::{RenderPipelineParts, render_pipeline, shader_module};
 use super::scene::SceneBindings;
 use super::{GpuScene, Recorder, shaders};
 use crate::{Camera, GBuffer};
@@ -61,6 +64,7 @@ impl GBufferTargets {
                 format,
                 usage: wgpu::TextureUsages::RENDER_ATTACHMENT
                     | wgpu::TextureUsages::TEXTURE_BINDING
+                    | wgpu::TextureUsages::COPY_DST
                     | wgpu::TextureUsages::COPY_SRC,
                 view_formats: &[],
             })
@@ -76,6 +80,35 @@ impl GBufferTargets {
         Self { depth, surface, object, triangle, views }
     }
 
+    /// Copies a G-buffer of the same size to [`surface`](Self::surface), [`object`](Self::object) and
+    /// [`triangle`](Self::triangle), so that a technique is asked about the very same surfaces on both backends. Positions
+    /// are kept as view depths, hence rounded anew. Depth cannot be copied and is left alone.
+    pub fn upload(&self, queue: &wgpu::Queue, gbuffer: &GBuffer) {
+        let surface: Vec<Vec4> = (0..gbuffer.pixel_count())
+            .map(|pixel| {
+                let seen = gbuffer.is_seen(pixel);
+                if seen { gbuffer.normal[pixel].extend(gbuffer.depth[pixel]) } else { Vec4::ZERO }
+            })
+            .collect();
+        for (texture, bytes) in [
+            (&self.surface, bytemuck::cast_slice(&surface)),
+            (&self.object, bytemuck::cast_slice(&gbuffer.object)),
+            (&self.triangle, bytemuck::cast_slice(&gbuffer.triangle)),
+        ] {
+            let size = texture.size();
+            let bytes: &[u8] = bytes;
+            if bytes.is_empty() {
+                continue;
+            }
+            let layout = wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(bytes.len() as u32 / gbuffer.height.max(1)),
+                rows_per_image: None,
+            };
+            queue.write_texture(texture.as_image_copy(), bytes, layout, size);
+        }
+    }
+
     /// What techniques are given.
     pub fn view(&self) -> GpuGBuffer<'_> {
         let [depth, surface, object, _] = &self.views;
@@ -86,7 +119,8 @@ impl GBufferTargets {
 /// Draws G-buffers: its pipelines, kept from frame to frame.
 #[derive(Debug)]
 pub struct GBufferPass {
-    camera_layout: wgpu::BindGroupLayout,
+    camera: HeldBuffer,
+    camera_group: HeldGroup,
     bindings: SceneBindings,
     solid: wgpu::RenderPipeline,
     cutout: wgpu::RenderPipeline,
@@ -97,7 +131,8 @@ impl GBufferPass {
     pub fn new(device: &wgpu::Device) -> Self {
         let module = shader_module(device, "gbuffer_pass", shaders::GBUFFER_PASS);
         let stages = wgpu::ShaderStages::VERTEX_FRAGMENT;
-        let camera_layout = uniform_layout(device, stages);
+        let camera_group = HeldGroup::new(device, "camera", stages, &[binding::UNIFORM]);
+        let camera_layout = camera_group.layout();
         let bindings = SceneBindings::new(device, stages);
         let targets = [GBufferTargets::SURFACE, GBufferTargets::ID, GBufferTargets::ID];
         let pipeline = |vertex, fragment, groups: &[&wgpu::BindGroupLayout]| {
@@ -116,9 +151,9 @@ impl GBufferPass {
             )
         };
         let (triangles, cutouts) = (&bindings.triangles_layout, &bindings.cutouts_layout);
-        let solid = pipeline("solid_vertex", "solid_fragment", &[&camera_layout, triangles]);
-        let cutout = pipeline("cutout_vertex", "cutout_fragment", &[&camera_layout, triangles, cutouts]);
-        Self { camera_layout, bindings, solid, cutout }
+        let solid = pipeline("solid_vertex", "solid_fragment", &[camera_layout, triangles]);
+        let cutout = pipeline("cutout_vertex", "cutout_fragment", &[camera_layout, triangles, cutouts]);
+        Self { camera: HeldBuffer::uniform("camera"), camera_group, bindings, solid, cutout }
     }
 
     /// Records the pass: all objects of `scene`, casters or not, as `camera` sees them. `stage` is the name under
@@ -131,8 +166,8 @@ impl GBufferPass {
         camera: &Camera,
         targets: &GBufferTargets,
     ) {
-        let uniform = recorder.uniform("camera", &CameraUniform::new(camera));
-        let camera_group = uniform_group(recorder.device, &self.camera_layout, &uniform);
+        let uniform = self.camera.get(recorder.device, bytemuck::bytes_of(&CameraUniform::new(camera)));
+        let camera_group = self.camera_group.get(recorder.device, &[uniform.into()]);
         let groups = self.bindings.groups(recorder.device, scene);
         let span = recorder.stage(stage);
         let [depth, surface, object, triangle] = &targets.views;

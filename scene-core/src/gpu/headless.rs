@@ -1,12 +1,16 @@
-//! A whole frame without a window: G-buffer, prepare, shade, read back. For the command line, tests and benchmarks.
+//! Whole frames without a window: G-buffer, prepare, shade, read back. For the command line, tests and benchmarks.
 
 use std::time::Instant;
 
 use thiserror::Error;
 
-use super::{GBufferPass, GBufferTargets, Gpu, GpuError, GpuShadowQuery, Recorder, SceneBuffers, StageTimer};
+use super::{
+    GBufferPass, GBufferTargets, Gpu, GpuError, GpuShadowQuery, GpuShadowTechnique, Recorder, SceneBuffers,
+    StageTimer,
+};
+use crate::report::GpuUse;
 use crate::technique::{ShadowQuery, ShadowTechnique, TechniqueError};
-use crate::{GBuffer, Report, VisibilityImage};
+use crate::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
 
 /// The format that headless frames are shaded in.
 pub const VISIBILITY_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
@@ -32,14 +36,38 @@ pub struct HeadlessFrame {
     pub visibility: VisibilityImage,
     /// What the camera saw.
     pub gbuffer: GBuffer,
-    /// Bytes and skips of both steps, and milliseconds per stage: `prepare.…` and `shade.…` of the technique,
-    /// `gbuffer` of the pass before. Without timestamps the steps are timed by the clock on the wall, uploads and
-    /// waiting included, as `prepare.wall` and `shade.wall`.
+    /// As [`HeadlessRun::report`], and `gbuffer` of the pass before.
     pub report: Report,
 }
 
+/// What running a technique once yields.
+#[derive(Clone, Debug)]
+pub struct HeadlessRun {
+    /// V of every pixel that sees a surface; NaN elsewhere.
+    pub visibility: VisibilityImage,
+    /// Bytes and skips of both steps, milliseconds per stage, `prepare.…` and `shade.…`, and the adapter. Without
+    /// timestamps the steps are timed by the clock on the wall, as `prepare.wall` and `shade.wall`.
+    pub report: Report,
+    /// Wall time of preparation, from recording to the end of the GPU's work.
+    pub prepare_ms: f64,
+    /// Wall time of shading, likewise.
+    pub shade_ms: f64,
+}
+
+/// A scene seen by a camera, on the device: techniques run on it any number of times.
+#[derive(Debug)]
+pub struct HeadlessView<'a> {
+    gpu: &'a Gpu,
+    scene: &'a Scene,
+    camera: &'a Camera,
+    buffers: SceneBuffers,
+    targets: GBufferTargets,
+    visibility: wgpu::Texture,
+    timer: Option<StageTimer>,
+}
+
 impl Gpu {
-    /// Renders the visibility that `technique` finds for `query`.
+    /// Renders the visibility that `technique` finds for `query`, for a G-buffer drawn on the GPU.
     ///
     /// # Errors
     /// What the device or the technique objects to.
@@ -48,59 +76,27 @@ impl Gpu {
         technique: &dyn ShadowTechnique,
         query: &ShadowQuery<'_>,
     ) -> Result<HeadlessFrame, HeadlessError> {
-        let camera = query.camera;
-        let buffers = self.scoped("scene upload", || SceneBuffers::new(&self.device, query.scene))??;
+        let mut view = self.view(query.scene, query.camera)?;
+        let mut on_gpu = view.technique(technique)?;
+        let (gbuffer, mut report) = view.draw_gbuffer()?;
+        let run = view.run(on_gpu.as_mut(), query.light, &gbuffer)?;
+        report.merge(&run.report);
+        Ok(HeadlessFrame { visibility: run.visibility, gbuffer, report })
+    }
+
+    /// Uploads a scene and makes the textures of a view.
+    ///
+    /// # Errors
+    /// What the device objects to: memory, for one.
+    pub fn view<'a>(&'a self, scene: &'a Scene, camera: &'a Camera) -> Result<HeadlessView<'a>, GpuError> {
+        let limit = self.device.limits().max_texture_dimension_2d;
+        GpuError::within("pixels a row or rows", camera.width.max(camera.height), limit)?;
+        let buffers = self.scoped("the scene", || SceneBuffers::new(&self.device, scene))??;
         let targets =
             self.scoped("the G-buffer", || GBufferTargets::new(&self.device, camera.width, camera.height))?;
         let visibility = self.scoped("the visibility texture", || self.visibility_texture(&targets))?;
-        let mut on_gpu = self.scoped("pipelines", || technique.gpu(&self.device, VISIBILITY_FORMAT))??;
-        let mut timer = StageTimer::new(&self.device, &self.queue, TIMED_PASSES);
-        let scene = buffers.view(Some(query.scene));
-
-        let mut report = Report::default();
-        self.step(&mut timer, "gbuffer", &mut report, |recorder| {
-            GBufferPass::new(&self.device).record(recorder, "gbuffer", &scene, camera, &targets);
-            Ok(Report::default())
-        })?;
-        self.step(&mut timer, "prepare.wall", &mut report, |recorder| {
-            on_gpu.prepare(recorder, &GpuShadowQuery { scene, light: query.light, camera })
-        })?;
-        self.step(&mut timer, "shade.wall", &mut report, |recorder| {
-            let view = visibility.create_view(&Default::default());
-            on_gpu.shade(recorder, camera, &targets.view(), &view)
-        })?;
-        let gbuffer = self.read_gbuffer(&targets, camera)?;
-        let visibility = self.read_visibility(&visibility, &gbuffer)?;
-        Ok(HeadlessFrame { visibility, gbuffer, report })
-    }
-
-    /// Records, submits and times one step.
-    fn step(
-        &self,
-        timer: &mut Option<StageTimer>,
-        wall_stage: &str,
-        report: &mut Report,
-        record: impl FnOnce(&mut Recorder<'_>) -> Result<Report, TechniqueError>,
-    ) -> Result<(), HeadlessError> {
-        let start = Instant::now();
-        let mut encoder = self.encoder();
-        let recorded = self.scoped(wall_stage, || {
-            let mut recorder = Recorder::new(&self.device, &self.queue, &mut encoder);
-            recorder.timer = timer.as_mut();
-            record(&mut recorder)
-        })??;
-        if let Some(timer) = timer {
-            timer.resolve(&mut encoder);
-        }
-        self.submit(encoder)?;
-        report.merge(&recorded);
-        match timer {
-            Some(timer) => report.merge(&self.read_times(timer)?),
-            None => {
-                report.stages_ms.insert(wall_stage.to_owned(), start.elapsed().as_secs_f64() * 1e3);
-            }
-        }
-        Ok(())
+        let timer = StageTimer::new(&self.device, &self.queue, TIMED_PASSES);
+        Ok(HeadlessView { gpu: self, scene, camera, buffers, targets, visibility, timer })
     }
 
     fn visibility_texture(&self, targets: &GBufferTargets) -> wgpu::Texture {
@@ -116,5 +112,95 @@ impl Gpu {
                 | wgpu::TextureUsages::COPY_SRC,
             view_formats: &[],
         })
+    }
+}
+
+impl HeadlessView<'_> {
+    /// Draws the G-buffer and reads it back; its time is booked as `gbuffer`.
+    ///
+    /// # Errors
+    /// What the device objects to.
+    pub fn draw_gbuffer(&mut self) -> Result<(GBuffer, Report), HeadlessError> {
+        let Self { gpu, scene, camera, buffers, targets, timer, .. } = self;
+        let (report, _) = gpu.step(timer, "gbuffer", |recorder| {
+            let scene = buffers.view(Some(scene));
+            GBufferPass::new(&gpu.device).record(recorder, "gbuffer", &scene, camera, targets);
+            Ok(Report::default())
+        })?;
+        Ok((gpu.read_gbuffer(targets, camera)?, report))
+    }
+
+    /// Takes a G-buffer of the camera's size instead, so that both backends are asked about the same surfaces.
+    ///
+    /// # Errors
+    /// What the device objects to: another size, for one.
+    pub fn upload_gbuffer(&mut self, gbuffer: &GBuffer) -> Result<(), GpuError> {
+        self.gpu.scoped("the G-buffer", || self.targets.upload(&self.gpu.queue, gbuffer))
+    }
+
+    /// The technique on this device: makes its pipelines.
+    ///
+    /// # Errors
+    /// [`TechniqueError::Unsupported`] if it has no GPU path; what the device objects to.
+    pub fn technique(
+        &self,
+        technique: &dyn ShadowTechnique,
+    ) -> Result<Box<dyn GpuShadowTechnique>, HeadlessError> {
+        let gpu = self.gpu;
+        Ok(gpu.scoped("pipelines", || technique.gpu(&gpu.device, VISIBILITY_FORMAT))??)
+    }
+
+    /// Prepares and shades once. `gbuffer` is what was drawn or uploaded last.
+    ///
+    /// # Errors
+    /// What the device or the technique objects to.
+    pub fn run(
+        &mut self,
+        technique: &mut dyn GpuShadowTechnique,
+        light: &Light,
+        gbuffer: &GBuffer,
+    ) -> Result<HeadlessRun, HeadlessError> {
+        let Self { gpu, scene, camera, buffers, targets, visibility, timer } = self;
+        let query = GpuShadowQuery { scene: buffers.view(Some(scene)), light, camera };
+        let (mut report, prepare_ms) =
+            gpu.step(timer, "prepare.wall", |recorder| technique.prepare(recorder, &query))?;
+        let view = visibility.create_view(&Default::default());
+        let (shaded, shade_ms) = gpu.step(timer, "shade.wall", |recorder| {
+            technique.shade(recorder, camera, &targets.view(), &view)
+        })?;
+        report.merge(&shaded);
+        report.gpu = Some(GpuUse { adapter: gpu.adapter_name(), features: gpu.features() });
+        let visibility = gpu.read_visibility(visibility, gbuffer)?;
+        Ok(HeadlessRun { visibility, report, prepare_ms, shade_ms })
+    }
+}
+
+impl Gpu {
+    /// Records, submits and times one step; returns its report and wall time in milliseconds.
+    fn step(
+        &self,
+        timer: &mut Option<StageTimer>,
+        wall_stage: &str,
+        record: impl FnOnce(&mut Recorder<'_>) -> Result<Report, TechniqueError>,
+    ) -> Result<(Report, f64), HeadlessError> {
+        let start = Instant::now();
+        let mut encoder = self.encoder();
+        let mut report = self.scoped(wall_stage, || {
+            let mut recorder = Recorder::new(&self.device, &self.queue, &mut encoder);
+            recorder.timer = timer.as_mut();
+            record(&mut recorder)
+        })??;
+        if let Some(timer) = timer {
+            timer.resolve(&mut encoder);
+        }
+        self.submit(encoder)?;
+        let wall_ms = start.elapsed().as_secs_f64() * 1e3;
+        match timer {
+            Some(timer) => report.merge(&self.read_times(timer)?),
+            None => {
+                report.stages_ms.insert(wall_stage.to_owned(), wall_ms);
+            }
+        }
+        Ok((report, wall_ms))
     }
 }

@@ -142,43 +142,24 @@ impl DepthUniform {
 
 #[cfg(test)]
 mod tests {
-    use std::mem::{offset_of, size_of};
-
-    use wgpu::naga;
-
     use super::*;
+    use crate::assert_layout;
     use crate::gpu::shaders;
 
-    /// Name and offset of each member of the struct whose linked name ends in `name`, and its size.
-    fn members(shader: &str, name: &str) -> (Vec<(String, usize)>, usize) {
-        let (_, source) = shaders::ALL.iter().find(|(module, _)| *module == shader).unwrap();
-        let module = naga::front::wgsl::parse_str(source).unwrap();
-        let (_, found) =
-            module.types.iter().find(|(_, t)| t.name.as_deref().is_some_and(|n| n.ends_with(name))).unwrap();
-        let naga::TypeInner::Struct { members, span } = &found.inner else { panic!("{name} is no struct") };
-        let listed = members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset as usize));
-        (listed.collect(), *span as usize)
-    }
-
-    macro_rules! same_layout {
-        ($rust:ty, $shader:literal, $name:literal, [$($field:ident),*]) => {
-            let (members, size) = members($shader, $name);
-            let expected = [$((stringify!($field).to_owned(), offset_of!($rust, $field))),*];
-            assert_eq!(members, expected, "{}", $name);
-            assert_eq!(size, size_of::<$rust>(), "{}", $name);
-        };
+    fn shader(name: &str) -> &'static str {
+        shaders::ALL.iter().find(|(module, _)| *module == name).unwrap().1
     }
 
     #[test]
     fn layouts_are_those_of_the_shaders() {
-        same_layout!(
+        assert_layout!(
             CameraUniform,
-            "camera",
+            shader("camera"),
             "Camera",
             [clip_from_relative, right, tan_x, up, tan_y, forward, near, eye, far, size, depth_scale]
         );
-        same_layout!(LightUniform, "light", "Light", [center, kind, axis, extent, u, sine, v]);
-        same_layout!(DepthUniform, "depth_pass", "DepthView", [clip_from_relative, origin]);
+        assert_layout!(LightUniform, shader("light"), "Light", [center, kind, axis, extent, u, sine, v]);
+        assert_layout!(DepthUniform, shader("depth_pass"), "DepthView", [clip_from_relative, origin]);
     }
 
     #[test]

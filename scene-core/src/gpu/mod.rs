@@ -6,7 +6,11 @@
 //! | [`scene`] | geometry in buffers, its upload and bind groups |
 //! | [`gbuffer`] | the G-buffer pass |
 //! | [`depth`] | the shadow-depth pass |
+//! | [`layers`] | depth maps as layers of one texture |
+//! | [`receivers`] | camera, light and G-buffer, as shaders read them |
+//! | [`visibility`] | the full-screen pass that writes V |
 //! | [`layout`] | uniforms of cameras and lights |
+//! | [`held`] | buffers and bind groups kept from frame to frame |
 //! | [`timing`] | the recorder, time per stage |
 //! | [`shaders`] | the linked WGSL |
 //! | [`adapter`], [`readback`], [`headless`] | a device without a window, reading back, a whole frame |
@@ -19,30 +23,39 @@
 //! feature; timestamps are used where the device has them.
 //!
 //! # Shared WGSL
-//! `shaders/*.wesl` of this crate are WESL modules: `scene_core::camera`, `light`, `sampling`, `gbuffer`, `scene`
-//! and `cutout` are imported by technique crates at build time (crate `gnomon-shader-build` says how and why). Bind
-//! groups have fixed places: 0 is the pass's own, 1 the scene's triangles, 2 its cut-outs.
+//! `shaders/*.wesl` of this crate are WESL modules: `scene_core::camera`, `light`, `sampling`, `gbuffer`, `scene`,
+//! `cutout`, `receivers` and `full_screen` are imported by technique crates at build time (crate `gnomon-shader-build`
+//! says how and why). Bind groups have fixed places: 0 is the pass's own, 1 the scene's triangles, 2 its cut-outs, 3
+//! the receivers and the light.
 
 pub mod adapter;
 pub mod depth;
 mod error;
 pub mod gbuffer;
 pub mod headless;
+pub mod held;
+pub mod layers;
 pub mod layout;
 mod pipeline;
 pub mod readback;
+pub mod receivers;
 pub mod scene;
 pub mod shaders;
 pub mod technique;
 pub mod testing;
 pub mod timing;
+pub mod visibility;
 
 pub use adapter::Gpu;
 pub use depth::{DepthIds, DepthPass, DepthTarget};
 pub use error::GpuError;
 pub use gbuffer::{GBufferPass, GBufferTargets, GpuGBuffer};
-pub use headless::{HeadlessError, HeadlessFrame};
+pub use headless::{HeadlessError, HeadlessFrame, HeadlessRun, HeadlessView};
+pub use held::{Bound, HeldBuffer, HeldGroup, binding};
+pub use layers::DepthLayers;
 pub use layout::{CameraUniform, DepthUniform, LightUniform};
-pub use scene::{GpuCutouts, GpuObject, GpuScene, SceneBuffers};
+pub use receivers::Receivers;
+pub use scene::{GpuCutouts, GpuObject, GpuScene, SceneBindings, SceneBuffers, SceneGroups};
 pub use technique::{GpuShadowQuery, GpuShadowTechnique};
 pub use timing::{Recorder, StageSpan, StageTimer};
+pub use visibility::{VisibilityPass, VisibilityPassParts};

@@ -1,40 +1,10 @@
-//! Pipelines and bind groups in the few shapes that the passes here need.
+//! Pipelines in the few shapes that the passes here need.
 
 /// A shader module from linked WGSL.
 pub(super) fn shader_module(device: &wgpu::Device, label: &str, wgsl: &str) -> wgpu::ShaderModule {
     device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(label),
         source: wgpu::ShaderSource::Wgsl(wgsl.into()),
-    })
-}
-
-/// A layout of one uniform buffer.
-pub(super) fn uniform_layout(device: &wgpu::Device, stages: wgpu::ShaderStages) -> wgpu::BindGroupLayout {
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("uniform"),
-        entries: &[wgpu::BindGroupLayoutEntry {
-            binding: 0,
-            visibility: stages,
-            ty: wgpu::BindingType::Buffer {
-                ty: wgpu::BufferBindingType::Uniform,
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
-            count: None,
-        }],
-    })
-}
-
-/// The group of [`uniform_layout`].
-pub(super) fn uniform_group(
-    device: &wgpu::Device,
-    layout: &wgpu::BindGroupLayout,
-    uniform: &wgpu::Buffer,
-) -> wgpu::BindGroup {
-    device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("uniform"),
-        layout,
-        entries: &[wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }],
     })
 }
 

@@ -1,12 +1,14 @@
 //! The scene on the GPU: what techniques are given, and the upload of a [`Scene`].
 
+use std::borrow::Cow;
 use std::ops::Range;
 
+use glam::Affine3A;
 use wgpu::util::DeviceExt as _;
 
 use super::GpuError;
-use crate::Scene;
 use crate::geometry::{Aabb, AlphaMask, ObjectFlags, Wrap};
+use crate::{Scene, TriangleMesh};
 
 /// An object of a [`GpuScene`]; its id is its place there, as in [`Scene::objects`].
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +55,33 @@ impl GpuScene<'_> {
     pub fn triangle_count(&self) -> u32 {
         self.objects.iter().map(|object| object.triangles.end).max().unwrap_or(0)
     }
+
+    /// The geometry in memory or, without it, a scene in its place that holds the bounds of each object as a box: for
+    /// what only needs to know where objects are, as fitting the views of a light. Object ids are the same, triangles
+    /// are not. An object without triangles, or whose bounds are not finite, is empty there.
+    pub fn geometry_or_boxes(&self) -> Cow<'_, Scene> {
+        if let Some(geometry) = self.geometry {
+            return Cow::Borrowed(geometry);
+        }
+        let mut boxes = Scene::new();
+        for object in self.objects {
+            let is_there = !object.triangles.is_empty() && !object.bounds.is_empty();
+            let mesh = if is_there { box_mesh(object.bounds) } else { TriangleMesh::default() };
+            if boxes.add(&mesh, Affine3A::IDENTITY, object.flags).is_err() {
+                // An empty mesh is always taken.
+                let _ = boxes.add(&TriangleMesh::default(), Affine3A::IDENTITY, object.flags);
+            }
+        }
+        Cow::Owned(boxes)
+    }
+}
+
+/// The faces of a box.
+fn box_mesh(bounds: Aabb) -> TriangleMesh {
+    // Bit 0 of a corner is x, bit 1 y, bit 2 z.
+    let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles = quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    TriangleMesh::new("box", bounds.corners().to_vec(), triangles.collect())
 }
 
 /// A [`Scene`] uploaded: owns the buffers that a [`GpuScene`] borrows.
@@ -243,6 +272,37 @@ impl SceneBindings {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn boxes_stand_in_for_geometry() {
+        let Some(gpu) = crate::gpu::testing::gpu() else { return };
+        let mut scene = Scene::new();
+        let corners = vec![glam::Vec3::ZERO, glam::Vec3::new(1.0, 2.0, 3.0), glam::Vec3::new(-1.0, 0.5, 0.0)];
+        let mesh = TriangleMesh::new("t", corners, vec![[0, 1, 2]]);
+        scene.add(&TriangleMesh::default(), Affine3A::IDENTITY, ObjectFlags::default()).unwrap();
+        scene.add(&mesh, Affine3A::IDENTITY, ObjectFlags { casts: false, ..Default::default() }).unwrap();
+        let buffers = SceneBuffers::new(&gpu.device, &scene).unwrap();
+        assert!(std::ptr::eq(&*buffers.view(Some(&scene)).geometry_or_boxes(), &scene));
+        let view = buffers.view(None);
+        let boxes = view.geometry_or_boxes();
+        assert_eq!(boxes.objects().len(), 2);
+        assert!(boxes.objects()[0].triangles.is_empty() && !boxes.objects()[1].flags.casts);
+        assert_eq!(boxes.objects()[1].bounds, scene.objects()[1].bounds);
+        // Each face's normal points away from the middle.
+        for triangle in 0..boxes.triangles().len() {
+            let [a, b, c] = boxes.corners(triangle);
+            assert!((b - a).cross(c - a).dot(a - boxes.bounds().center()) > 0.0, "{triangle}");
+        }
+        // What is not finite is nowhere.
+        let broken = [GpuObject {
+            triangles: 0..1,
+            bounds: Aabb { min: glam::Vec3::ZERO, max: glam::Vec3::INFINITY },
+            flags: ObjectFlags::default(),
+            has_mask: false,
+        }];
+        let boxes = GpuScene { objects: &broken, ..view };
+        assert!(boxes.geometry_or_boxes().triangles().is_empty());
+    }
 
     #[test]
     fn masks_are_packed_and_shared() {

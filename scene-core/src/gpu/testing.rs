@@ -1,6 +1,8 @@
-//! For tests of GPU code: a device or an explicit skip, and a kernel runner for unit tests of shader functions.
+//! For tests of GPU code: a device or an explicit skip, a kernel runner for unit tests of shader functions, and
+//! the layout of a shader's structs, to hold Rust's against ([`assert_layout!`](crate::assert_layout)).
 
 use bytemuck::Pod;
+use wgpu::naga;
 use wgpu::util::DeviceExt as _;
 
 use super::pipeline::shader_module;
@@ -71,4 +73,30 @@ pub fn run_kernel<I: Pod, O: Pod>(gpu: &Gpu, wgsl: &str, inputs: &[I]) -> Result
     })?;
     gpu.submit(encoder)?;
     gpu.read_buffer(&outputs)
+}
+
+/// Name and offset of each member of a struct in linked WGSL, and its size in bytes. Linking puts a module's path before
+/// names, so `name` is the end of one.
+///
+/// # Panics
+/// If `wgsl` does not parse or has no such struct.
+pub fn struct_layout(wgsl: &str, name: &str) -> (Vec<(String, usize)>, usize) {
+    let module = naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|error| panic!("{error}"));
+    let is_it = |ty: &naga::Type| ty.name.as_deref().is_some_and(|linked| linked.ends_with(name));
+    let found = module.types.iter().find(|(_, ty)| is_it(ty)).map(|(_, ty)| &ty.inner);
+    let Some(naga::TypeInner::Struct { members, span }) = found else { panic!("there is no struct {name}") };
+    let listed = members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset as usize));
+    (listed.collect(), *span as usize)
+}
+
+/// Asserts that a Rust struct has size and offsets of the struct of this name in linked WGSL: `assert_layout!(CameraUniform,
+/// shaders::CAMERA, "Camera", [eye, far])`, all members of the shader's in their order. Padding is not named.
+#[macro_export]
+macro_rules! assert_layout {
+    ($rust:ty, $wgsl:expr, $name:literal, [$($field:ident),* $(,)?]) => {
+        let (members, size) = $crate::gpu::testing::struct_layout($wgsl, $name);
+        let expected = [$((stringify!($field).to_owned(), ::core::mem::offset_of!($rust, $field))),*];
+        assert_eq!(members, expected, "{}", $name);
+        assert_eq!(size, ::core::mem::size_of::<$rust>(), "{}", $name);
+    };
 }

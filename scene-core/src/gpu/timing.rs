@@ -77,8 +77,8 @@ impl fmt::Debug for StageTimer {
 
 /// Where a technique records: the caller's device, queue and encoder, and a timer if the caller has one.
 ///
-/// Nothing recorded here is submitted, and nothing waits. Uniforms are fresh buffers a call, so that any number
-/// of calls may share one encoder.
+/// Nothing recorded here is submitted, and nothing waits. What the CPU hands over is in buffers that are not written
+/// again ([`HeldBuffer`](super::HeldBuffer)), so that any number of calls may share one encoder.
 #[derive(Debug)]
 pub struct Recorder<'a> {
     /// The device.
@@ -104,16 +104,6 @@ impl<'a> Recorder<'a> {
     /// Books a pass under `stage`, named as on the CPU: `prepare.…` or `shade.…`.
     pub fn stage(&mut self, stage: &str) -> StageSpan {
         StageSpan(self.timer.as_mut().and_then(|timer| timer.begin(stage)))
-    }
-
-    /// A uniform buffer holding `value`.
-    pub fn uniform<T: bytemuck::Pod>(&self, label: &str, value: &T) -> wgpu::Buffer {
-        use wgpu::util::DeviceExt as _;
-        self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(label),
-            contents: bytemuck::bytes_of(value),
-            usage: wgpu::BufferUsages::UNIFORM,
-        })
     }
 }
 

@@ -38,6 +38,16 @@ pub enum TechniqueError {
         /// Values given.
         got: usize,
     },
+    /// Shading was asked for before anything was prepared.
+    #[error("{technique} has nothing prepared to shade with")]
+    NotPrepared {
+        /// The technique's name.
+        technique: &'static str,
+    },
+    /// The device.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] crate::gpu::GpuError),
     /// Anything that only one technique knows.
     #[error(transparent)]
     Other(#[from] Box<dyn std::error::Error + Send + Sync>),

@@ -1,0 +1,80 @@
+//! Uniforms as the shaders read them. A test holds every offset against the linked WGSL.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat4, Vec3};
+
+use crate::light_views::{LightView, Unprojection};
+
+/// `LightView` of `light_views.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct ViewUniform {
+    /// World to clip space.
+    pub projection_from_world: Mat4,
+    /// Where a central view sees from; the far, middle point of a parallel one.
+    pub origin: Vec3,
+    /// Distance at which reversed depth is 1; 0 for a parallel view.
+    pub near: f32,
+    /// World-space vector of a unit of NDC x.
+    pub x: Vec3,
+    /// Half the longer diagonal of the map: everywhere, or of a central view at distance 1.
+    pub half_diagonal: f32,
+    /// World-space vector of a unit of NDC y.
+    pub y: Vec3,
+    /// Zero.
+    pub padding: u32,
+    /// World-space vector of a unit of depth, or of a central view's axis to the middle of its map.
+    pub z: Vec3,
+    /// Zero.
+    pub padding_2: u32,
+}
+
+impl ViewUniform {
+    /// What shaders need of `view`.
+    pub fn new(view: &LightView) -> Self {
+        let (origin, near, x, y, z) = match view.unprojection() {
+            Unprojection::Parallel { origin, x, y, z } => (origin, 0.0, x, y, z),
+            Unprojection::Central { eye, forward, x, y, near } => (eye, near, x, y, forward),
+        };
+        Self {
+            projection_from_world: view.projection_from_world,
+            origin,
+            near,
+            x,
+            half_diagonal: (x.length_squared() + y.length_squared()).sqrt(),
+            y,
+            padding: 0,
+            z,
+            padding_2: 0,
+        }
+    }
+}
+
+/// `Maps` of `light_views.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct MapsUniform {
+    /// Views, of which each has a layer.
+    pub count: u32,
+    /// [`plane_tolerance`](crate::receiver_plane::plane_tolerance).
+    pub tolerance: f32,
+}
+
+#[cfg(test)]
+mod tests {
+    use scene_core::assert_layout;
+
+    use super::*;
+    use crate::gpu::shaders::HARD;
+
+    #[test]
+    fn layouts_are_those_of_the_shaders() {
+        assert_layout!(
+            ViewUniform,
+            HARD,
+            "LightView",
+            [projection_from_world, origin, near, x, half_diagonal, y, z]
+        );
+        assert_layout!(MapsUniform, HARD, "Maps", [count, tolerance]);
+    }
+}

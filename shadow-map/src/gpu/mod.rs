@@ -1,0 +1,184 @@
+//! The GPU path: the stages of [`cpu`](crate::cpu) under the same names, recorded into the caller's encoder.
+//!
+//! `prepare.views` is the CPU's own code. `prepare.maps` draws the casters, depth and triangle a texel, into a layer
+//! a view. `shade.lookup` asks the questions of [`receiver_plane`](crate::receiver_plane) in one full-screen pass.
+//!
+//! V differs from the CPU's only where the hardware's rasteriser gives a texel on a caster's outline to the other side
+//! of it, or a receiver on the border of two texels to the other one.
+
+pub mod layout;
+pub mod shaders;
+
+use std::ops::Range;
+
+use scene_core::gpu::{
+    DepthIds, DepthLayers, DepthPass, GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers,
+    Recorder, SceneBindings, SceneGroups, VisibilityPass, VisibilityPassParts, binding,
+};
+use scene_core::technique::{Params as _, TechniqueError};
+use scene_core::{Camera, Report, relevance};
+
+use crate::ShadowMapParams;
+use crate::light_views::{LightView, light_views};
+use crate::receiver_plane::plane_tolerance;
+use layout::{MapsUniform, ViewUniform};
+
+/// The technique on one device: pipelines, and the maps of the light prepared last.
+#[derive(Debug)]
+pub struct ShadowMapOnGpu {
+    params: ShadowMapParams,
+    depth: DepthPass,
+    layers: DepthLayers,
+    maps: HeldBuffer,
+    views: HeldBuffer,
+    own: HeldGroup,
+    scene: SceneBindings,
+    receivers: Receivers,
+    lookup: VisibilityPass,
+    prepared: Option<Prepared>,
+}
+
+/// What `prepare` leaves to `shade`.
+#[derive(Debug)]
+struct Prepared {
+    own: wgpu::BindGroup,
+    scene: SceneGroups,
+}
+
+impl ShadowMapOnGpu {
+    /// Makes the pipelines. `visibility` is the format of the texture that V is written to.
+    ///
+    /// # Errors
+    /// A `map_size` that the device has no texture of.
+    pub fn new(
+        device: &wgpu::Device,
+        params: ShadowMapParams,
+        visibility: wgpu::TextureFormat,
+    ) -> Result<Self, TechniqueError> {
+        GpuError::within("texels a side of a map", params.map_size, device.limits().max_texture_dimension_2d)?;
+        let stages = wgpu::ShaderStages::FRAGMENT;
+        let types = [binding::UNIFORM, binding::STORAGE, binding::DEPTH_LAYERS, binding::ID_LAYERS];
+        let own = HeldGroup::new(device, "shadow maps", stages, &types);
+        let scene = SceneBindings::new(device, stages);
+        let receivers = Receivers::new(device);
+        let lookup = VisibilityPass::new(
+            device,
+            &VisibilityPassParts {
+                label: "shadow-map hard",
+                wgsl: shaders::HARD,
+                fragment: "shade_hard",
+                own: own.layout(),
+                scene: &scene,
+                receivers: &receivers,
+                format: visibility,
+            },
+        );
+        Ok(Self {
+            params,
+            depth: DepthPass::new(device, DepthIds::Triangle, None),
+            layers: DepthLayers::new(DepthIds::Triangle),
+            maps: HeldBuffer::uniform("maps"),
+            views: HeldBuffer::storage("views of the light"),
+            own,
+            scene,
+            receivers,
+            lookup,
+            prepared: None,
+        })
+    }
+
+    /// Records the drawing of the maps of the query's light. They hold for any camera.
+    ///
+    /// Without [`GpuScene::geometry`](scene_core::gpu::GpuScene::geometry) the views are fitted to the bounds of
+    /// objects, which takes more texels than the vertices would.
+    ///
+    /// # Errors
+    /// More maps or texels than the device has.
+    pub fn prepare(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        query: &GpuShadowQuery<'_>,
+    ) -> Result<Report, TechniqueError> {
+        let mut report = Report::default();
+        let geometry = query.scene.geometry_or_boxes();
+        let tolerance = plane_tolerance(geometry.bounds(), query.light);
+        let (casters, views) = report.time("prepare.views", |_| {
+            let casters = relevance::told_apart(&geometry, query.light, tolerance);
+            let views = light_views(&geometry, query.light, &casters.drawn, self.params.skip);
+            (casters, views)
+        });
+        report.skip("casters", casters.backdrops.len() as u64);
+        report.skip("faces", views.skipped_faces);
+        let is_drawn = |id: usize| {
+            let object = &geometry.objects()[id];
+            !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
+        };
+        let objects = query.scene.objects.iter().enumerate().filter(|(id, _)| is_drawn(*id));
+        let ranges: Vec<_> = objects.map(|(_, object)| object.triangles.clone()).collect();
+
+        self.render_maps(recorder, query, &ranges, &views.views)?;
+        report.bytes = self.layers.bytes();
+
+        let device = recorder.device;
+        let maps = MapsUniform { count: views.views.len() as u32, tolerance };
+        let mut uniforms: Vec<_> = views.views.iter().map(ViewUniform::new).collect();
+        if uniforms.is_empty() {
+            // A binding must not be empty.
+            uniforms.push(bytemuck::Zeroable::zeroed());
+        }
+        let maps = self.maps.get(device, bytemuck::bytes_of(&maps));
+        let views = self.views.get(device, bytemuck::cast_slice(&uniforms));
+        self.prepared = None;
+        if let (Some(depth), Some(ids)) = (self.layers.bound_depth(), self.layers.bound_ids()) {
+            let own = self.own.get(device, &[maps.into(), views.into(), depth, ids]);
+            self.prepared = Some(Prepared { own, scene: self.scene.groups(device, &query.scene) });
+        }
+        self.receivers.prepare(device, query);
+        Ok(report)
+    }
+
+    /// `prepare.maps`: draws the casters, ranges of triangles, as each view sees them.
+    fn render_maps(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        query: &GpuShadowQuery<'_>,
+        casters: &[Range<u32>],
+        views: &[LightView],
+    ) -> Result<(), GpuError> {
+        self.layers.resize(recorder.device, self.params.map_size, views.len() as u32)?;
+        let projections = views.iter().map(|view| view.projection_from_world);
+        let targets = self.layers.targets(projections, Some(casters));
+        self.depth.record(recorder, "prepare.maps", &query.scene, &targets);
+        Ok(())
+    }
+
+    /// `shade.lookup`: records the pass that writes V of every pixel, 1 where nothing is seen.
+    ///
+    /// # Errors
+    /// [`TechniqueError::NotPrepared`].
+    pub fn shade(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        camera: &Camera,
+        gbuffer: &GpuGBuffer<'_>,
+        visibility: &wgpu::TextureView,
+    ) -> Result<Report, TechniqueError> {
+        let not_prepared = || TechniqueError::NotPrepared { technique: ShadowMapParams::TECHNIQUE };
+        let prepared = self.prepared.as_ref().ok_or_else(not_prepared)?;
+        let receivers = self.receivers.group(recorder.device, camera, gbuffer).ok_or_else(not_prepared)?;
+        self.lookup.record(
+            recorder,
+            "shade.lookup",
+            &prepared.own,
+            &prepared.scene,
+            &receivers,
+            visibility,
+        );
+        Ok(Report { bytes: self.layers.bytes(), ..Default::default() })
+    }
+
+    /// The maps, one a layer, and the triangles they see; for tests and whoever else wants them.
+    pub fn layers(&self) -> &DepthLayers {
+        &self.layers
+    }
+}
