@@ -115,12 +115,14 @@ Examples:
   gnomon compare dragon.obj
   gnomon compare cornell --size 256x256 --out out/cornell
   gnomon compare scene.toml --techniques shadow-map,shadow-map@high --samples 1024
+  gnomon compare chess --backend cpu,gpu
 
 Writes index.html (open it: a slider between any two images), contact-sheet.png, table.csv and report.json.
 
 Errors are taken over valid pixels: those whose surface faces the light (n·l > 0.05) with the whole light \
 above it. mae is the mean of |error|, rmse the root of its mean square, p99 its 99th percentile, pen_rmse the \
-rmse in and around penumbrae. Times are the fastest of up to three runs; ground truth runs once.")]
+rmse in and around penumbrae. Times are of the fastest of up to three runs; ground truth runs once. On the GPU \
+they go from recording to the end of its work; uploads of the scene and making of pipelines are not in them.")]
 pub(crate) struct CompareArgs {
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
@@ -129,9 +131,9 @@ pub(crate) struct CompareArgs {
     /// Techniques, separated by commas; NAME@PRESET takes a preset [default: all, in every variant]
     #[arg(long, value_name = "A,B", value_delimiter = ',')]
     pub(crate) techniques: Vec<String>,
-    /// Where techniques run
-    #[arg(long, value_enum, default_value_t)]
-    pub(crate) backend: Backend,
+    /// Where techniques run; cpu,gpu shows both side by side
+    #[arg(long, value_enum, value_name = "BACKEND", value_delimiter = ',', default_value = "auto")]
+    pub(crate) backend: Vec<Backend>,
     /// Error at which the error maps saturate
     #[arg(long, value_name = "E", default_value_t = 0.5, value_parser = parse_error_scale)]
     pub(crate) error_scale: f32,
@@ -205,12 +207,13 @@ pub(crate) struct TechniquesArgs {
 /// Where a technique runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Backend {
-    /// The GPU if the technique and the machine have one, else the CPU
+    /// The GPU if the technique has a path on it and the machine has one that is not in software, else the CPU
     #[default]
     Auto,
     /// The CPU
     Cpu,
-    /// The GPU; exit code 3 if there is none
+    /// The GPU, one in software too; exit code 3 if there is none. The variable GNOMON_ADAPTER chooses one by number
+    /// or a part of its name
     Gpu,
 }
 

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use scene_core::camera::CameraError;
+#[cfg(feature = "gpu")]
+use scene_core::gpu::{GpuError, HeadlessError};
 use scene_core::io::write::WriteError;
 use scene_core::metrics::MetricsError;
 use scene_core::reference::{Cancelled, ExactError};
@@ -48,8 +50,16 @@ pub(crate) enum CliError {
     Settings(#[from] SettingsError),
     #[error(transparent)]
     Technique(#[from] TechniqueError),
-    #[error("--backend gpu: {technique} has no GPU path in this build; take --backend cpu or auto")]
-    NoGpu { technique: &'static str },
+    #[error("--backend gpu: {technique} has no GPU path with these settings; take --backend cpu or auto")]
+    NoGpuPath { technique: &'static str },
+    #[cfg(feature = "gpu")]
+    #[error("--backend gpu: {0}")]
+    Gpu(#[source] GpuError),
+    #[cfg(not(feature = "gpu"))]
+    #[error(
+        "--backend gpu: this build leaves GPUs out; take --backend cpu or auto, or build with the feature 'gpu'"
+    )]
+    NoGpuInBuild,
     #[error("the technique's image cannot be compared with ground truth")]
     Metrics(#[from] MetricsError),
     #[error(transparent)]
@@ -81,9 +91,21 @@ impl CliError {
     fn exit(&self) -> Exit {
         match self {
             Self::Stdout(error) if error.kind() == io::ErrorKind::BrokenPipe => QUIET,
-            Self::NoGpu { .. } => NO_GPU,
+            Self::NoGpuPath { .. } => NO_GPU,
+            #[cfg(feature = "gpu")]
+            Self::Gpu(error) => exit_of_gpu(error),
+            #[cfg(not(feature = "gpu"))]
+            Self::NoGpuInBuild => NO_GPU,
             _ => BAD_INPUT,
         }
+    }
+
+    /// Whether the GPU is at fault, so that the CPU may do instead.
+    pub(crate) fn is_of_gpu(&self) -> bool {
+        #[cfg(feature = "gpu")]
+        return matches!(self, Self::Gpu(_));
+        #[cfg(not(feature = "gpu"))]
+        false
     }
 
     /// Tells the user in one line, causes after colons, and gives the exit code.
@@ -93,6 +115,42 @@ impl CliError {
             console::stderr_line(&format!("gnomon: {}", chain(self)));
         }
         exit.into()
+    }
+}
+
+/// No GPU, or none any more, is told apart from one for which the input or the settings are too much.
+#[cfg(feature = "gpu")]
+fn exit_of_gpu(error: &GpuError) -> Exit {
+    match error {
+        GpuError::TurnedOff
+        | GpuError::NoAdapter
+        | GpuError::NoSuchAdapter { .. }
+        | GpuError::Device { .. }
+        | GpuError::Lost { .. }
+        | GpuError::Timeout { .. } => NO_GPU,
+        GpuError::OutOfMemory { .. }
+        | GpuError::TooLarge { .. }
+        | GpuError::Beyond { .. }
+        | GpuError::Validation { .. } => BAD_INPUT,
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl From<GpuError> for CliError {
+    fn from(error: GpuError) -> Self {
+        Self::Gpu(error)
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl From<HeadlessError> for CliError {
+    fn from(error: HeadlessError) -> Self {
+        match error {
+            HeadlessError::Gpu(error) | HeadlessError::Technique(TechniqueError::Gpu(error)) => {
+                Self::Gpu(error)
+            }
+            HeadlessError::Technique(error) => Self::Technique(error),
+        }
     }
 }
 
@@ -129,9 +187,31 @@ mod tests {
 
     #[test]
     fn exit_codes() {
-        assert_eq!(CliError::NoGpu { technique: "psm" }.exit(), Exit(3));
+        assert_eq!(CliError::NoGpuPath { technique: "psm" }.exit(), Exit(3));
         assert_eq!(CliError::Camera(CameraError::NoUp).exit(), Exit(2));
         let gone = io::Error::from(io::ErrorKind::BrokenPipe);
         assert_eq!(CliError::Stdout(gone).exit(), Exit(0));
+    }
+    #[cfg(feature = "gpu")]
+    #[test]
+    fn a_gpu_that_is_gone_and_one_that_is_too_small() {
+        let (what, message) = (|| "maps".to_owned(), String::new());
+        for (error, code) in [
+            (GpuError::NoAdapter, 3),
+            (GpuError::Lost { message: message.clone() }, 3),
+            (GpuError::Timeout { seconds: 300 }, 3),
+            (GpuError::OutOfMemory { what: what() }, 2),
+            (GpuError::TooLarge { what: "triangles", bytes: 9, limit: 8 }, 2),
+            (GpuError::Beyond { what: "maps", value: 9, limit: 8 }, 2),
+            (GpuError::Validation { what: what(), message: message.clone() }, 2),
+        ] {
+            let told = CliError::from(HeadlessError::Technique(TechniqueError::Gpu(error.clone())));
+            assert!(told.is_of_gpu() && told.exit() == Exit(code), "{told}");
+            let text = chain(&told);
+            assert!(
+                text.starts_with("--backend gpu: ") && text.matches(&error.to_string()).count() == 1,
+                "{text}"
+            );
+        }
     }
 }

@@ -76,7 +76,7 @@ pub(crate) fn trace(
         valid: valid_pixels(gbuffer, light),
     };
     let subject = Subject { technique: "reference".to_owned(), variant, settings };
-    Ok((truth, RunReport::cpu(view, subject, prepare_ms, shade_ms, report)))
+    Ok((truth, RunReport::new(view, subject, prepare_ms, shade_ms, report)))
 }
 
 #[cfg(test)]

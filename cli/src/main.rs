@@ -5,6 +5,7 @@
 //! ([`picture`], [`compare`]) and puts its files in place at the very end ([`output`]): if anything fails, nothing is written.
 
 mod args;
+mod backend;
 mod commands;
 mod compare;
 mod console;

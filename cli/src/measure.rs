@@ -1,4 +1,4 @@
-//! Running a technique and taking its time.
+//! Running a technique and taking its time, on either backend.
 
 use std::time::Instant;
 
@@ -6,10 +6,15 @@ use scene_core::technique::{ShadowQuery, ShadowTechnique};
 use scene_core::{GBuffer, VisibilityImage};
 
 use crate::args::Backend;
+use crate::backend::{Gpu, Side};
+use crate::console::Console;
 use crate::error::CliError;
 use crate::report::{RunReport, Subject};
 use crate::scene_source::View;
 use crate::techniques::variant_of;
+
+#[cfg(feature = "gpu")]
+use scene_core::gpu::HeadlessView;
 
 /// A finished run: the image and what it cost.
 #[derive(Clone, Debug)]
@@ -18,56 +23,126 @@ pub(crate) struct Run {
     pub(crate) report: RunReport,
 }
 
-/// Refuses a backend that the technique does not have.
-pub(crate) fn check_backend(technique: &dyn ShadowTechnique, backend: Backend) -> Result<(), CliError> {
-    match backend {
-        // No technique of this build can be run on the GPU from here, whatever its crate offers.
-        Backend::Gpu => Err(CliError::NoGpu { technique: technique.name() }),
-        Backend::Auto | Backend::Cpu => Ok(()),
+/// A view that techniques are run on. Both backends are asked about the same G-buffer.
+pub(crate) struct Stand<'a> {
+    view: &'a View,
+    gbuffer: &'a GBuffer,
+    gpu: Option<&'a Gpu>,
+    /// The scene on the GPU, from the first run there on.
+    #[cfg(feature = "gpu")]
+    on_gpu: Option<HeadlessView<'a>>,
+}
+
+impl<'a> Stand<'a> {
+    pub(crate) fn new(view: &'a View, gbuffer: &'a GBuffer, gpu: Option<&'a Gpu>) -> Self {
+        Self {
+            view,
+            gbuffer,
+            gpu,
+            #[cfg(feature = "gpu")]
+            on_gpu: None,
+        }
+    }
+
+    /// Prepares and shades up to `runs` times on `side`, and returns the fastest run.
+    ///
+    /// Under [`Backend::Auto`] what the GPU cannot do is done on the CPU.
+    pub(crate) fn run(
+        &mut self,
+        technique: &dyn ShadowTechnique,
+        (backend, side): (Backend, Side),
+        runs: usize,
+        console: &Console,
+    ) -> Result<Run, CliError> {
+        match self.fastest(technique, side, runs) {
+            Err(error) if backend == Backend::Auto && side == Side::Gpu && error.is_of_gpu() => {
+                console.note(&format!("note: {} runs on the CPU: {error}", technique.name()));
+                // A device that failed once is not asked again.
+                self.gpu = None;
+                self.fastest(technique, Side::Cpu, runs)
+            }
+            result => result,
+        }
+    }
+
+    fn fastest(&mut self, technique: &dyn ShadowTechnique, side: Side, runs: usize) -> Result<Run, CliError> {
+        match (side, self.gpu) {
+            (Side::Cpu, _) | (Side::Gpu, None) => fastest_of(runs, || self.on_cpu(technique)),
+            (Side::Gpu, Some(gpu)) => self.on_gpu(technique, gpu, runs),
+        }
+    }
+
+    /// One run on the CPU.
+    fn on_cpu(&self, technique: &dyn ShadowTechnique) -> Result<Run, CliError> {
+        let (view, gbuffer) = (self.view, self.gbuffer);
+        let query = ShadowQuery { scene: &view.setup.scene, light: view.light(), camera: &view.setup.camera };
+        let start = Instant::now();
+        let (prepared, mut report) = technique.prepare(&query)?;
+        let prepare_ms = milliseconds_since(start);
+        let mut visibility = VisibilityImage::new(gbuffer.width, gbuffer.height);
+        let start = Instant::now();
+        let shaded = prepared.shade(gbuffer, &mut visibility)?;
+        let shade_ms = milliseconds_since(start);
+        report.merge(&shaded);
+        Ok(Run { visibility, report: RunReport::new(view, subject(technique), prepare_ms, shade_ms, report) })
+    }
+
+    /// The fastest run on the GPU; pipelines are made once.
+    #[cfg(feature = "gpu")]
+    fn on_gpu(
+        &mut self,
+        technique: &dyn ShadowTechnique,
+        gpu: &'a Gpu,
+        runs: usize,
+    ) -> Result<Run, CliError> {
+        let (view, gbuffer) = (self.view, self.gbuffer);
+        let stage = match &mut self.on_gpu {
+            Some(stage) => stage,
+            none => {
+                let stage = none.insert(gpu.view(&view.setup.scene, &view.setup.camera)?);
+                stage.upload_gbuffer(gbuffer)?;
+                stage
+            }
+        };
+        let mut on_gpu = stage.technique(technique)?;
+        fastest_of(runs, || {
+            let run = stage.run(on_gpu.as_mut(), view.light(), gbuffer)?;
+            let report = RunReport::new(view, subject(technique), run.prepare_ms, run.shade_ms, run.report);
+            Ok(Run { visibility: run.visibility, report })
+        })
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn on_gpu(&mut self, _: &dyn ShadowTechnique, gpu: &'a Gpu, _: usize) -> Result<Run, CliError> {
+        match *gpu {}
     }
 }
 
-/// Prepares and shades once.
-pub(crate) fn run(technique: &dyn ShadowTechnique, view: &View, gbuffer: &GBuffer) -> Result<Run, CliError> {
-    let query = ShadowQuery { scene: &view.setup.scene, light: view.light(), camera: &view.setup.camera };
-    let start = Instant::now();
-    let (prepared, mut report) = technique.prepare(&query)?;
-    let prepare_ms = milliseconds_since(start);
-    let mut visibility = VisibilityImage::new(gbuffer.width, gbuffer.height);
-    let start = Instant::now();
-    let shaded = prepared.shade(gbuffer, &mut visibility)?;
-    let shade_ms = milliseconds_since(start);
-    report.merge(&shaded);
-    let subject = Subject {
-        technique: technique.name().to_owned(),
-        variant: variant_of(technique),
-        settings: technique.settings(),
-    };
-    Ok(Run { visibility, report: RunReport::cpu(view, subject, prepare_ms, shade_ms, report) })
-}
-
-/// The fastest of up to `RUNS` runs; no further one begins after `BUDGET_MS`. The first one pays for cold
-/// caches and fresh memory, which a renderer pays once and not per frame.
-pub(crate) fn fastest(
-    technique: &dyn ShadowTechnique,
-    view: &View,
-    gbuffer: &GBuffer,
-) -> Result<Run, CliError> {
-    const RUNS: usize = 3;
+/// The fastest of up to `runs` runs; no further one begins after two seconds. The first one pays for cold caches and
+/// fresh memory, which a renderer pays once and not per frame.
+fn fastest_of(runs: usize, mut run: impl FnMut() -> Result<Run, CliError>) -> Result<Run, CliError> {
     const BUDGET_MS: f64 = 2000.0;
     let total_ms = |run: &Run| run.report.prepare_ms + run.report.shade_ms;
     let start = Instant::now();
-    let mut best = run(technique, view, gbuffer)?;
-    for _ in 1..RUNS {
+    let mut best = run()?;
+    for _ in 1..runs {
         if milliseconds_since(start) > BUDGET_MS {
             break;
         }
-        let next = run(technique, view, gbuffer)?;
+        let next = run()?;
         if total_ms(&next) < total_ms(&best) {
             best = next;
         }
     }
     Ok(best)
+}
+
+fn subject(technique: &dyn ShadowTechnique) -> Subject {
+    Subject {
+        technique: technique.name().to_owned(),
+        variant: variant_of(technique),
+        settings: technique.settings(),
+    }
 }
 
 /// Milliseconds of wall time.

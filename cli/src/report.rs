@@ -6,6 +6,7 @@ use scene_core::{Light, Report};
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::backend::Side;
 use crate::scene_source::View;
 
 /// Which light of the scene was looked at.
@@ -40,13 +41,15 @@ pub(crate) struct RunReport {
     pub(crate) backend: &'static str,
     /// The GPU it ran on; none on the CPU.
     pub(crate) adapter: Option<String>,
+    /// Features of that GPU in use, beyond what every one has.
+    pub(crate) features: Vec<String>,
     /// Every setting with its value.
     pub(crate) settings: Value,
     /// Milliseconds of each stage, `prepare.*` and `shade.*`.
     pub(crate) stages_ms: BTreeMap<String, f64>,
-    /// Wall time of preparation.
+    /// Wall time of preparation; on the GPU from recording to the end of its work.
     pub(crate) prepare_ms: f64,
-    /// Wall time of shading.
+    /// Wall time of shading, likewise.
     pub(crate) shade_ms: f64,
     /// Bytes held for this light.
     pub(crate) bytes: u64,
@@ -68,15 +71,18 @@ pub(crate) struct Subject {
 }
 
 impl RunReport {
-    /// A run on the CPU.
-    pub(crate) fn cpu(view: &View, subject: Subject, prepare_ms: f64, shade_ms: f64, report: Report) -> Self {
+    /// A run, on the GPU if its report says so.
+    pub(crate) fn new(view: &View, subject: Subject, prepare_ms: f64, shade_ms: f64, report: Report) -> Self {
+        let side = if report.gpu.is_some() { Side::Gpu } else { Side::Cpu };
+        let (adapter, features) = report.gpu.map(|gpu| (gpu.adapter, gpu.features)).unzip();
         Self {
             scene: view.setup.name.clone(),
             light: LightReport::new(view.light_index, view.light()),
             technique: subject.technique,
             variant: subject.variant,
-            backend: "cpu",
-            adapter: None,
+            backend: side.name(),
+            adapter,
+            features: features.unwrap_or_default(),
             settings: subject.settings,
             stages_ms: report.stages_ms,
             prepare_ms,

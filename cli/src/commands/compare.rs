@@ -1,24 +1,30 @@
 //! `gnomon compare`: every technique beside ground truth.
 
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use scene_core::io::write;
 use scene_core::raster::render_gbuffer;
-use scene_core::technique::TechniqueError;
+use scene_core::technique::{ShadowTechnique, TechniqueError};
 
-use crate::args::CompareArgs;
+use crate::args::{Backend, CompareArgs};
+use crate::backend::Side;
 use crate::compare::{Comparison, Entry, Refused, Truth, page, sheet, table};
 use crate::console::Console;
 use crate::error::CliError;
+use crate::measure::Stand;
 use crate::output::OutputFolder;
 use crate::picture::shading::Shading;
-use crate::{ground_truth, measure, picture, scene_source, techniques};
+use crate::techniques::Chosen;
+use crate::{backend, ground_truth, picture, scene_source, techniques};
+
+/// Runs of which the fastest counts.
+const RUNS: usize = 3;
 
 pub(crate) fn run(args: &CompareArgs, console: &Console) -> Result<(), CliError> {
     let chosen = techniques::chosen(&args.techniques, args.scene.seed)?;
-    for chosen in &chosen {
-        measure::check_backend(chosen.technique.as_ref(), args.backend)?;
-    }
+    let gpu = backend::open(&args.backend)?;
+    let plan = plan(chosen, &args.backend, gpu.is_some())?;
     let view = scene_source::view(&args.scene, console)?;
     let out = OutputFolder::check(&args.out.clone().unwrap_or_else(|| default_out(&view.setup.name)))?;
 
@@ -30,15 +36,18 @@ pub(crate) fn run(args: &CompareArgs, console: &Console) -> Result<(), CliError>
     let shading = Shading::new(&gbuffer, &view.setup.camera, view.light());
     let truth_row = Truth::new(&truth, truth_report, &shading)?;
     let (mut entries, mut refused) = (Vec::new(), Vec::new());
-    for chosen in chosen {
-        let _working = console.working(chosen.label.clone());
-        match measure::fastest(chosen.technique.as_ref(), &view, &gbuffer) {
-            Ok(run) => entries.push(Entry::new(chosen.label, run, &truth, &shading, args.error_scale)?),
+    let mut stand = Stand::new(&view, &gbuffer, gpu.as_ref());
+    for Planned { label, technique, backend, side } in plan {
+        let Some(side) = side else {
+            refused
+                .push(Refused { technique: label, why: "it has no GPU path with these settings".to_owned() });
+            continue;
+        };
+        let _working = console.working(label.clone());
+        match stand.run(technique.as_ref(), (backend, side), RUNS, console) {
+            Ok(run) => entries.push(Entry::new(label, run, &truth, &shading, args.error_scale)?),
             Err(CliError::Technique(TechniqueError::Unsupported { input, why, .. })) => {
-                refused.push(Refused {
-                    technique: chosen.label,
-                    why: format!("it does not take {input}: {why}"),
-                });
+                refused.push(Refused { technique: label, why: format!("it does not take {input}: {why}") });
             }
             Err(error) => return Err(error),
         }
@@ -62,6 +71,41 @@ pub(crate) fn run(args: &CompareArgs, console: &Console) -> Result<(), CliError>
     }
     console.note(&format!("wrote {}", out.path().join("index.html").display()));
     console.result(&comparison.report(), &format!("{}\n\n{}", comparison.facts(), table::text(&comparison)))
+}
+
+/// A technique and where it runs.
+struct Planned {
+    label: String,
+    technique: Rc<dyn ShadowTechnique>,
+    backend: Backend,
+    /// None if it has no such path.
+    side: Option<Side>,
+}
+
+/// What runs where: every technique once on each side that `backends` come down to.
+///
+/// # Errors
+/// If nothing could run because a GPU is asked for and no technique has a path on it.
+fn plan(chosen: Vec<Chosen>, backends: &[Backend], has_gpu: bool) -> Result<Vec<Planned>, CliError> {
+    let mut plan: Vec<Planned> = Vec::new();
+    for Chosen { label, technique } in chosen {
+        let technique: Rc<dyn ShadowTechnique> = Rc::from(technique);
+        let first = plan.len();
+        for &backend in backends {
+            let side = backend::side(technique.as_ref(), backend, has_gpu);
+            let is_known = plan[first..].iter().any(|planned| planned.side == side);
+            if !is_known {
+                let label = if side == Some(Side::Cpu) { label.clone() } else { format!("{label} (gpu)") };
+                plan.push(Planned { label, technique: Rc::clone(&technique), backend, side });
+            }
+        }
+    }
+    match plan.first() {
+        Some(first) if plan.iter().all(|planned| planned.side.is_none()) => {
+            Err(CliError::NoGpuPath { technique: first.technique.name() })
+        }
+        _ => Ok(plan),
+    }
 }
 
 /// `out/` and the scene's name, reduced to what any file system takes.

@@ -7,22 +7,26 @@ use crate::args::RenderArgs;
 use crate::compare::table::milliseconds;
 use crate::console::Console;
 use crate::error::CliError;
+use crate::measure::Stand;
 use crate::output::OutputFolder;
 use crate::picture::shading::Shading;
-use crate::{measure, picture, scene_source, techniques};
+use crate::{backend, picture, scene_source, techniques};
 
 pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<(), CliError> {
     let factory = techniques::find(&args.technique)?;
     let overrides = techniques::with_seed(factory, &args.set, args.scene.seed);
     let technique = factory.create(args.preset.as_deref(), &overrides)?;
-    measure::check_backend(technique.as_ref(), args.backend)?;
+    let gpu = backend::open(&[args.backend])?;
+    let side = backend::side(technique.as_ref(), args.backend, gpu.is_some())
+        .ok_or(CliError::NoGpuPath { technique: technique.name() })?;
     let out = OutputFolder::check(&args.out)?;
     let view = scene_source::view(&args.scene, console)?;
 
     let run = {
         let _working = console.working(format!("rendering with {}", args.technique));
         let gbuffer = render_gbuffer(&view.setup.scene, &view.setup.camera);
-        let run = measure::run(technique.as_ref(), &view, &gbuffer)?;
+        let mut stand = Stand::new(&view, &gbuffer, gpu.as_ref());
+        let run = stand.run(technique.as_ref(), (args.backend, side), 1, console)?;
         let shading = Shading::new(&gbuffer, &view.setup.camera, view.light());
         let image = picture::png(shading.picture(&run.visibility))?;
         let visibility = &run.visibility;
@@ -41,10 +45,11 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<(), CliError> 
     };
     let report = &run.report;
     let text = format!(
-        "{}: {} {}, prepare {} ms, shade {} ms\n",
+        "{}: {} {} on the {}, prepare {} ms, shade {} ms\n",
         out.path().display(),
         report.technique,
         report.variant,
+        report.adapter.as_deref().map_or_else(|| "CPU".to_owned(), |adapter| format!("GPU {adapter}")),
         milliseconds(report.prepare_ms),
         milliseconds(report.shade_ms),
     );

@@ -137,7 +137,11 @@ impl DepthPass {
             };
             let draws = match &mut drawn {
                 Some((triangles, draws)) if *triangles == target.triangles => draws,
-                drawn => &mut drawn.insert((target.triangles, draws(scene, target.triangles, self.ids, is_masked))).1,
+                drawn => {
+                    &mut drawn
+                        .insert((target.triangles, draws(scene, target.triangles, self.ids, is_masked)))
+                        .1
+                }
             };
             if self.views.len() <= index {
                 self.views.resize_with(index + 1, || {
@@ -282,7 +286,13 @@ mod tests {
             has_mask: false,
         };
         // In any order, one that does not cast, one empty.
-        let objects = [object(6..9, true), object(0..4, true), object(4..6, true), object(9..9, true), object(9..12, false)];
+        let objects = [
+            object(6..9, true),
+            object(0..4, true),
+            object(4..6, true),
+            object(9..9, true),
+            object(9..12, false),
+        ];
         let scene = GpuScene {
             positions: &buffer,
             triangles: &buffer,

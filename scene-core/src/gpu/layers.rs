@@ -75,7 +75,10 @@ impl DepthLayers {
         let (limits, layers) = (device.limits(), layers.max(1));
         GpuError::within("texels a side of a map", size, limits.max_texture_dimension_2d)?;
         GpuError::within("maps", layers, limits.max_texture_array_layers)?;
-        if self.held.as_ref().is_some_and(|held| held.size == size && held.depth.each.len() >= layers as usize)
+        if self
+            .held
+            .as_ref()
+            .is_some_and(|held| held.size == size && held.depth.each.len() >= layers as usize)
         {
             return Ok(());
         }

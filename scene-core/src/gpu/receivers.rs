@@ -19,8 +19,7 @@ impl Receivers {
     /// The layout, for fragment and compute stages.
     pub fn new(device: &wgpu::Device) -> Self {
         let stages = wgpu::ShaderStages::FRAGMENT | wgpu::ShaderStages::COMPUTE;
-        let types =
-            [binding::UNIFORM, binding::UNIFORM, binding::FLOATS, binding::IDS, binding::STORAGE];
+        let types = [binding::UNIFORM, binding::UNIFORM, binding::FLOATS, binding::IDS, binding::STORAGE];
         Self {
             group: HeldGroup::new(device, "receivers", stages, &types),
             camera: HeldBuffer::uniform("camera"),

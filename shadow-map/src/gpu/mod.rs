@@ -55,7 +55,11 @@ impl ShadowMapOnGpu {
         params: ShadowMapParams,
         visibility: wgpu::TextureFormat,
     ) -> Result<Self, TechniqueError> {
-        GpuError::within("texels a side of a map", params.map_size, device.limits().max_texture_dimension_2d)?;
+        GpuError::within(
+            "texels a side of a map",
+            params.map_size,
+            device.limits().max_texture_dimension_2d,
+        )?;
         let stages = wgpu::ShaderStages::FRAGMENT;
         let types = [binding::UNIFORM, binding::STORAGE, binding::DEPTH_LAYERS, binding::ID_LAYERS];
         let own = HeldGroup::new(device, "shadow maps", stages, &types);
@@ -166,14 +170,7 @@ impl ShadowMapOnGpu {
         let not_prepared = || TechniqueError::NotPrepared { technique: ShadowMapParams::TECHNIQUE };
         let prepared = self.prepared.as_ref().ok_or_else(not_prepared)?;
         let receivers = self.receivers.group(recorder.device, camera, gbuffer).ok_or_else(not_prepared)?;
-        self.lookup.record(
-            recorder,
-            "shade.lookup",
-            &prepared.own,
-            &prepared.scene,
-            &receivers,
-            visibility,
-        );
+        self.lookup.record(recorder, "shade.lookup", &prepared.own, &prepared.scene, &receivers, visibility);
         Ok(Report { bytes: self.layers.bytes(), ..Default::default() })
     }
 
