@@ -212,7 +212,7 @@ pub(crate) enum Backend {
     Auto,
     /// The CPU
     Cpu,
-    /// The GPU, one in software too; exit code 3 if there is none. The variable GNOMON_ADAPTER chooses one by number
+    /// The GPU, one in software too; exit code 3 if there is none. The variable `GNOMON_ADAPTER` chooses one by number
     /// or a part of its name
     Gpu,
 }

@@ -195,15 +195,15 @@ mod tests {
     #[cfg(feature = "gpu")]
     #[test]
     fn a_gpu_that_is_gone_and_one_that_is_too_small() {
-        let (what, message) = (|| "maps".to_owned(), String::new());
+        let text = || "maps".to_owned();
         for (error, code) in [
             (GpuError::NoAdapter, 3),
-            (GpuError::Lost { message: message.clone() }, 3),
+            (GpuError::Lost { message: text() }, 3),
             (GpuError::Timeout { seconds: 300 }, 3),
-            (GpuError::OutOfMemory { what: what() }, 2),
+            (GpuError::OutOfMemory { what: text() }, 2),
             (GpuError::TooLarge { what: "triangles", bytes: 9, limit: 8 }, 2),
             (GpuError::Beyond { what: "maps", value: 9, limit: 8 }, 2),
-            (GpuError::Validation { what: what(), message: message.clone() }, 2),
+            (GpuError::Validation { what: text(), message: text() }, 2),
         ] {
             let told = CliError::from(HeadlessError::Technique(TechniqueError::Gpu(error.clone())));
             assert!(told.is_of_gpu() && told.exit() == Exit(code), "{told}");

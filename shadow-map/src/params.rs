@@ -20,6 +20,13 @@ impl Variant {
     /// The names, in the same order.
     const NAMES: &'static [&'static str] = &["hard"];
 
+    /// Whether it runs on a GPU, too.
+    pub fn has_gpu_path(self) -> bool {
+        match self {
+            Self::Hard => true,
+        }
+    }
+
     /// The name in settings and reports.
     pub fn name(self) -> &'static str {
         match self {

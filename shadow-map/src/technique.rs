@@ -29,8 +29,13 @@ impl ShadowTechnique for ShadowMap {
                 CENTRE
             }
             Capability::AlphaMask | Capability::TriangleSoup | Capability::FreePoints => Support::Exact,
-            Capability::Gpu if cfg!(feature = "gpu") => Support::Exact,
-            Capability::Gpu => Support::Unsupported("built without the feature 'gpu'"),
+            Capability::Gpu if !cfg!(feature = "gpu") => {
+                Support::Unsupported("built without the feature 'gpu'")
+            }
+            Capability::Gpu if !self.params.variant.has_gpu_path() => {
+                Support::Unsupported("this variant has a CPU path only")
+            }
+            Capability::Gpu => Support::Exact,
         };
         Description {
             summary: SUMMARY,

@@ -106,16 +106,6 @@ fn time_moves_nothing_in_a_file() {
 }
 
 #[test]
-fn a_gpu_that_is_not_there() {
-    for command in [
-        &["render", "quads", "--technique", "shadow-map", "--backend", "gpu", "--out", "out"][..],
-        &["compare", "quads", "--backend", "gpu"],
-    ] {
-        fails(3, &[], command, "--backend gpu");
-    }
-}
-
-#[test]
 fn an_output_folder_that_cannot_be() {
     let command = ["render", "quads", "--technique", "shadow-map", "--size", "8x8", "--out"];
     fails(2, &[("file", b"mine")], &[&command[..], &["file"]].concat(), "file");

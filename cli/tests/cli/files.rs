@@ -52,6 +52,7 @@ fn a_report_has_exactly_its_keys() {
             "adapter",
             "backend",
             "bytes",
+            "features",
             "height",
             "light",
             "prepare_ms",

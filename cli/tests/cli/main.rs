@@ -1,5 +1,6 @@
 //! The `gnomon` command, run end to end.
 
+mod backends;
 mod bad_input;
 mod compare;
 mod files;
