@@ -22,9 +22,7 @@ impl Variant {
 
     /// Whether it runs on a GPU, too.
     pub fn has_gpu_path(self) -> bool {
-        match self {
-            Self::Hard => true,
-        }
+        matches!(self, Self::Hard)
     }
 
     /// The name in settings and reports.
