@@ -73,7 +73,76 @@ pub fn receiver(maps: &LightMaps<'_>, gbuffer: &GBuffer, pixel: usize) -> Result
         return Err(0.0);
     }
     let tolerance = maps.tolerance + view_tolerance(gbuffer.depth[pixel]);
-    Ok(Receiver { point, normal, object, tolerance })
+    let width = gbuffer.width as usize;
+    let pixel = [(pixel % width) as u32, (pixel / width) as u32];
+    Ok(Receiver { point, normal, object, tolerance, pixel })
+}
+
+/// `shade.filter`: as [`shade_pixels`], for answers that count what needed no filter. Returns their sum.
+pub fn filter_pixels(
+    maps: &LightMaps<'_>,
+    gbuffer: &GBuffer,
+    visibility: &mut VisibilityImage,
+    answer: impl Fn(&Receiver, &mut u64) -> f32 + Sync,
+) -> u64 {
+    let width = gbuffer.width.max(1) as usize;
+    let rows = visibility.values.par_chunks_mut(width).enumerate();
+    rows.map(|(row, values)| {
+        let mut count = 0;
+        for (column, value) in values.iter_mut().enumerate() {
+            *value = match receiver(maps, gbuffer, row * width + column) {
+                Ok(receiver) => answer(&receiver, &mut count),
+                Err(known) => known,
+            };
+        }
+        count
+    })
+    .sum()
+}
+
+/// `shade.filter` for free points: each is answered as a small surface turned to the light's centre.
+pub fn filter_points(
+    maps: &LightMaps<'_>,
+    points: &[Vec3],
+    visibility: &mut [f32],
+    answer: impl Fn(&Receiver) -> f32 + Sync,
+) {
+    answer_points(points, visibility, |point| {
+        if !point.is_finite() {
+            return f32::NAN;
+        }
+        if !maps.light.reaches(point) || maps.is_behind_backdrop(point) {
+            return 0.0;
+        }
+        let (to_light, _) = maps.light.center().ray_from(point);
+        let (normal, tolerance) = (to_light.normalize_or_zero(), maps.tolerance);
+        answer(&Receiver { point, normal, object: GBuffer::NOTHING, tolerance, pixel: [0; 2] })
+    });
+}
+
+/// `prepare.ids`: the object of every texel's triangle, [`GBuffer::NOTHING`] where there is none.
+pub fn object_ids(scene: &Scene, maps: &[ShadowMapView]) -> Vec<Vec<u32>> {
+    let ids_of = |triangles: &[u32]| {
+        // Neighbours mostly see the same object.
+        let (mut range, mut id) = (0..0, GBuffer::NOTHING);
+        let id_of = |&triangle: &u32| {
+            if triangle == GBuffer::NOTHING {
+                return GBuffer::NOTHING;
+            }
+            let triangle = triangle as usize;
+            if !range.contains(&triangle) {
+                id = scene.object_of(triangle);
+                range = scene.objects()[id as usize].triangles.clone();
+            }
+            id
+        };
+        triangles.iter().map(id_of).collect::<Vec<_>>()
+    };
+    let ids_of_map = |map: &ShadowMapView| {
+        let rows = map.triangles.par_chunks((map.map.width as usize).max(1));
+        rows.flat_map_iter(ids_of).collect()
+    };
+    maps.iter().map(ids_of_map).collect()
 }
 
 /// `shade.lookup` for free points. What the longer slice has more is left alone.

@@ -1,14 +1,26 @@
 #![doc = include_str!("../README.md")]
 
 pub mod cpu;
+pub mod depth_pyramid;
+pub mod filter_maps;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod hard;
+pub mod light_cone;
 pub mod light_maps;
 pub mod light_views;
+mod moments;
+mod object_id;
 mod params;
+mod pcf;
+mod pcss;
+pub mod pixel_hash;
+pub mod poisson_disk;
 pub mod receiver_plane;
+pub mod search_region;
+pub mod taps;
 mod technique;
+pub mod texel_plane;
 pub mod view_casters;
 
 use std::fmt::Debug;
@@ -20,7 +32,11 @@ use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
 use hard::Hard;
 use light_maps::{LightMaps, ShadowMapView};
 use light_views::LightView;
-pub use params::{ShadowMapParams, Variant};
+use moments::Moments;
+use object_id::ObjectId;
+pub use params::{Kernel, ShadowMapParams, Variant};
+use pcf::Pcf;
+use pcss::Pcss;
 pub use technique::Factory;
 
 /// The technique: settings, from which any number of lights can be prepared.
@@ -76,17 +92,16 @@ impl ShadowMap {
         chunks: &CasterChunks,
     ) -> (PreparedShadowMap<'a>, Report) {
         self.prepare_with(scene, light, |casters, views, report| {
-            self.params.skip.then(|| {
-                report.time("prepare.relevance", |report| {
-                    let map_size = self.params.map_size;
-                    let region = view_casters::looked_up(scene, light, camera, views, map_size);
-                    let kept = relevance::relevant_casters(scene, &region, chunks, |id| {
-                        let object = &scene.objects()[id as usize];
-                        !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
-                    });
-                    kept.book(report);
-                    kept
-                })
+            let reach = self.params.reach_texels().filter(|_| self.params.skip)?;
+            report.time("prepare.relevance", |report| {
+                let map_size = self.params.map_size;
+                let region = view_casters::looked_up(scene, light, camera, views, map_size, reach);
+                let kept = relevance::relevant_casters(scene, &region, chunks, |id| {
+                    let object = &scene.objects()[id as usize];
+                    !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
+                });
+                kept.book(report);
+                Some(kept)
             })
         })
     }
@@ -97,9 +112,14 @@ impl ShadowMap {
         light: &Light,
         choose: impl FnOnce(&Backdrops<'a>, &[LightView], &mut Report) -> Option<RelevantCasters>,
     ) -> (PreparedShadowMap<'a>, Report) {
-        let mut report = Report::default();
-        let variant: Box<dyn PreparedVariant + 'a> = match self.params.variant {
-            Variant::Hard => Box::new(Hard(LightMaps::draw(scene, light, &self.params, &mut report, choose))),
+        let (mut report, params) = (Report::default(), &self.params);
+        let draw = |report: &mut Report| LightMaps::draw(scene, light, params, report, choose);
+        let variant: Box<dyn PreparedVariant + 'a> = match params.variant {
+            Variant::Hard => Box::new(Hard(draw(&mut report))),
+            Variant::Pcf => Box::new(Pcf::new(draw(&mut report), params, &mut report)),
+            Variant::Pcss => Box::new(Pcss::new(draw(&mut report), params, &mut report)),
+            Variant::ObjectId => Box::new(ObjectId::new(draw(&mut report), params, &mut report)),
+            Variant::Moments => Box::new(Moments::new(draw(&mut report), params, &mut report)),
         };
         (PreparedShadowMap { variant }, report)
     }

@@ -51,6 +51,8 @@ pub struct Receiver {
     pub object: u32,
     /// Distance from a plane below which it counts as on it, in scene units.
     pub tolerance: f32,
+    /// Column and row of the pixel that sees it: what its random numbers are drawn from.
+    pub pixel: [u32; 2],
 }
 
 /// A stored surface point: what the light sees in the texel that a receiver falls into.
@@ -75,9 +77,11 @@ impl<'a> LightMaps<'a> {
         choose: impl FnOnce(&Backdrops<'a>, &[LightView], &mut Report) -> Option<RelevantCasters>,
     ) -> Self {
         let tolerance = plane_tolerance(scene.bounds(), light);
+        // A filter looks from a face without casters into those beside it.
+        let skip_faces = params.skip && params.reach_texels() == Some(0.0);
         let (casters, views) = report.time("prepare.views", |_| {
             let casters = relevance::told_apart(scene, light, tolerance);
-            let views = light_views::light_views(scene, light, &casters.drawn, params.skip);
+            let views = light_views::light_views(scene, light, &casters.drawn, skip_faces);
             (casters, views)
         });
         report.skip("casters", casters.backdrops.len() as u64);

@@ -105,6 +105,14 @@ impl LightView {
         self.unproject
     }
 
+    /// As [`project`](Self::project), also beside the map; `None` behind the light.
+    #[inline]
+    pub fn project_beyond(&self, point: Vec3) -> Option<Vec2> {
+        let clip = self.projection_from_world * point.extend(1.0);
+        let ndc = Vec2::new(clip.x, clip.y) / clip.w;
+        (clip.w > 0.0 && ndc.is_finite()).then_some(ndc)
+    }
+
     /// Half the longer diagonal of the map in world units at reversed depth `depth`: what one unit of NDC along
     /// both axes is at most. Times 2/`map_size` it is the diagonal of a texel.
     #[inline]
@@ -124,6 +132,13 @@ impl LightView {
             Unprojection::Parallel { x, y, .. } => f64::from(x.length().hypot(y.length())),
             Unprojection::Central { x, y, .. } => f64::from(x.length().hypot(y.length())) * distance,
         }
+    }
+
+    /// Reversed depth of a world-space point before the view: the inverse of [`unproject`](Self::unproject).
+    #[inline]
+    pub fn depth_of(&self, point: Vec3) -> f32 {
+        let clip = self.projection_from_world * point.extend(1.0);
+        clip.z / clip.w
     }
 
     /// The world-space point at normalised device coordinates `ndc` and reversed depth `depth > 0`.

@@ -3,22 +3,36 @@
 use scene_core::technique::{Params, Preset, Setting, SettingKind};
 use serde::{Deserialize, Serialize};
 
-/// Which shadow map algorithm runs.
+/// Which shadow map algorithm runs. Costs are per pixel, beside one drawing of the casters a view.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Variant {
     /// One comparison a pixel: V is 0 or 1. Exact up to the map's resolution for lights without extent; an
-    /// extended light is taken for its centre. Cost: one map, one texel a pixel. Williams 1978.
+    /// extended light is taken for its centre. Cost: one texel. Williams 1978.
     #[default]
     Hard,
+    /// Percentage-closer filtering: shadow edges without jags, blurred by as many texels everywhere. For lights of
+    /// little extent. Cost: (`filter` + 1)² texels, or `taps`. Reeves, Salesin, Cook 1987.
+    Pcf,
+    /// As `pcf`, with the caster's object id beside its depth: no object shadows itself, so convex objects need
+    /// no more questions. Loses all self-shadowing. Cost: as `pcf`, fewer reads a texel. Hourcade, Nicolas 1985.
+    ObjectId,
+    /// Percentage-closer soft shadows: penumbrae from the light's true size and shape, hard at the contact, wide far
+    /// from it. The choice for area lights where one map must do. Cost: up to 2·`taps` texels where a shadow's edge
+    /// may be, a handful elsewhere. Fernando 2005.
+    Pcss,
+    /// Moment shadow maps: blurred once, then one lookup a pixel however wide the blur. Leaks light where shadows lie
+    /// over each other. Cost: four texels of 16 bytes. Peters and Klein 2015; with `moments` = 2, variance shadow
+    /// maps, Donnelly and Lauritzen 2006.
+    Moments,
 }
 
 impl Variant {
     /// Every variant, in the order of the tables.
-    pub const ALL: [Self; 1] = [Self::Hard];
+    pub const ALL: [Self; 5] = [Self::Hard, Self::Pcf, Self::ObjectId, Self::Pcss, Self::Moments];
 
     /// The names, in the same order.
-    const NAMES: &'static [&'static str] = &["hard"];
+    const NAMES: &'static [&'static str] = &["hard", "pcf", "object-id", "pcss", "moments"];
 
     /// Whether it runs on a GPU, too.
     pub fn has_gpu_path(self) -> bool {
@@ -29,8 +43,23 @@ impl Variant {
     pub fn name(self) -> &'static str {
         match self {
             Self::Hard => "hard",
+            Self::Pcf => "pcf",
+            Self::ObjectId => "object-id",
+            Self::Pcss => "pcss",
+            Self::Moments => "moments",
         }
     }
+}
+
+/// Which texels around a receiver a filter asks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kernel {
+    /// All in a square, weighed by the area they share with it: smooth, cost grows with the square of the side.
+    #[default]
+    Grid,
+    /// `taps` in a circle, turned by a random angle a pixel: cost is fixed, V is noisy.
+    PoissonDisk,
 }
 
 /// Settings of [`ShadowMap`](crate::ShadowMap).
@@ -41,6 +70,18 @@ pub struct ShadowMapParams {
     pub variant: Variant,
     /// Texels a side of each map, 1 to 16,384. Error falls in proportion; memory is 8 bytes a texel and view.
     pub map_size: u32,
+    /// Which texels `pcf` and `object-id` ask.
+    pub kernel: Kernel,
+    /// Width of the filter of `pcf`, `object-id` and `moments` in texels, 1 to 64. Blur grows in proportion.
+    pub filter: u32,
+    /// Texels asked a pixel where they are a choice, 1 to 1,024: noise falls, cost grows in proportion.
+    pub taps: u32,
+    /// Powers of the depth that `moments` keeps: 4, or 2 (3 is as 2), which leak more light.
+    pub moments: u32,
+    /// V up to which `moments` takes light for leaked, 0 to 0.99; above, V is stretched to reach 1. Darkens penumbrae.
+    pub light_bleeding: f32,
+    /// What random numbers are drawn from.
+    pub seed: u32,
     /// Leave out what cannot change the image: views without casters or receivers. Off only to measure.
     pub skip: bool,
     /// Draw into the maps only what can be looked up from the query's camera. The maps then hold for that camera
@@ -51,7 +92,33 @@ pub struct ShadowMapParams {
 
 impl ShadowMapParams {
     /// The settings that presets are told apart from.
-    const DEFAULT: Self = Self { variant: Variant::Hard, map_size: 1024, skip: true, view_dependent: false };
+    const DEFAULT: Self = Self {
+        variant: Variant::Hard,
+        map_size: 1024,
+        kernel: Kernel::Grid,
+        filter: 5,
+        taps: 64,
+        moments: 4,
+        light_bleeding: 0.0,
+        seed: 0,
+        skip: true,
+        view_dependent: false,
+    };
+
+    const PCF: Self = Self { variant: Variant::Pcf, ..Self::DEFAULT };
+    const PCSS: Self = Self { variant: Variant::Pcss, ..Self::DEFAULT };
+    const MOMENTS: Self = Self { variant: Variant::Moments, ..Self::DEFAULT };
+    const OBJECT_ID: Self = Self { variant: Variant::ObjectId, ..Self::DEFAULT };
+
+    /// How many texels beside a receiver's own its lookup reads at most; `None` if that depends on more than the
+    /// settings.
+    pub(crate) fn reach_texels(&self) -> Option<f64> {
+        match self.variant {
+            Variant::Hard => Some(0.0),
+            Variant::Pcss | Variant::Moments => None,
+            Variant::Pcf | Variant::ObjectId => Some(f64::from(self.filter) * 0.5 + 2.0),
+        }
+    }
 }
 
 impl Default for ShadowMapParams {
@@ -68,13 +135,49 @@ impl Params for ShadowMapParams {
             name: "variant",
             kind: SettingKind::Choice(Variant::NAMES),
             unit: "",
-            doc: "the algorithm: hard compares one texel a pixel",
+            doc: "the algorithm: hard asks one texel, pcf and object-id average many, pcss as many as the penumbra is wide",
         },
         Setting {
             name: "map_size",
             kind: SettingKind::Int { min: 1, max: 16_384 },
             unit: "texels a side",
             doc: "resolution of each map",
+        },
+        Setting {
+            name: "kernel",
+            kind: SettingKind::Choice(&["grid", "poisson-disk"]),
+            unit: "",
+            doc: "texels asked by pcf and object-id: all of a square, or some of a circle at random",
+        },
+        Setting {
+            name: "filter",
+            kind: SettingKind::Int { min: 1, max: 64 },
+            unit: "texels",
+            doc: "width of the filter of pcf, object-id and moments",
+        },
+        Setting {
+            name: "taps",
+            kind: SettingKind::Int { min: 1, max: 1024 },
+            unit: "texels a pixel",
+            doc: "texels asked where they are chosen at random",
+        },
+        Setting {
+            name: "moments",
+            kind: SettingKind::Int { min: 2, max: 4 },
+            unit: "",
+            doc: "powers of the depth that moments keeps: 2 or 4, and 3 is as 2",
+        },
+        Setting {
+            name: "light_bleeding",
+            kind: SettingKind::Float { min: 0.0, max: 0.99 },
+            unit: "V",
+            doc: "V up to which moments takes light for leaked",
+        },
+        Setting {
+            name: "seed",
+            kind: SettingKind::Int { min: 0, max: u32::MAX as u64 },
+            unit: "",
+            doc: "what random numbers are drawn from",
         },
         Setting {
             name: "skip",
@@ -96,6 +199,18 @@ impl Params for ShadowMapParams {
         Preset { name: "medium", params: Self { map_size: 1024, ..Self::DEFAULT } },
         Preset { name: "high", params: Self { map_size: 2048, ..Self::DEFAULT } },
         Preset { name: "ultra", params: Self { map_size: 4096, ..Self::DEFAULT } },
+        Preset { name: "pcf-low", params: Self { map_size: 512, filter: 3, ..Self::PCF } },
+        Preset { name: "pcf-medium", params: Self::PCF },
+        Preset { name: "pcf-high", params: Self { map_size: 2048, filter: 9, ..Self::PCF } },
+        Preset { name: "pcss-low", params: Self { map_size: 512, taps: 16, ..Self::PCSS } },
+        Preset { name: "pcss-medium", params: Self::PCSS },
+        Preset { name: "pcss-high", params: Self { map_size: 2048, taps: 256, ..Self::PCSS } },
+        Preset { name: "moments-low", params: Self { map_size: 512, filter: 3, ..Self::MOMENTS } },
+        Preset { name: "moments-medium", params: Self::MOMENTS },
+        Preset { name: "moments-high", params: Self { map_size: 2048, filter: 9, ..Self::MOMENTS } },
+        Preset { name: "object-id-low", params: Self { map_size: 512, filter: 3, ..Self::OBJECT_ID } },
+        Preset { name: "object-id-medium", params: Self::OBJECT_ID },
+        Preset { name: "object-id-high", params: Self { map_size: 2048, filter: 9, ..Self::OBJECT_ID } },
     ];
 }
 

@@ -14,7 +14,7 @@ use scene_core::{GBuffer, Report, VisibilityImage};
 
 #[cfg(feature = "gpu")]
 use crate::gpu::ShadowMapOnGpu;
-use crate::{PreparedShadowMap, ShadowMap, ShadowMapParams};
+use crate::{PreparedShadowMap, ShadowMap, ShadowMapParams, Variant};
 
 impl ShadowTechnique for ShadowMap {
     fn name(&self) -> &'static str {
@@ -23,10 +23,20 @@ impl ShadowTechnique for ShadowMap {
 
     fn describe(&self) -> Description {
         const CENTRE: Support = Support::Approximate("an extended light is taken for its centre");
+        const BLUR: Support = Support::Approximate("the blur is as many texels wide everywhere");
+        const MEAN: Support = Support::Approximate("blockers count as if all were at their mean distance");
+        let variant = self.params.variant;
         let support = |capability| match capability {
-            Capability::DirectionalLight | Capability::PointLight | Capability::SpotLight => Support::Exact,
+            Capability::DirectionalLight | Capability::PointLight | Capability::SpotLight => match variant {
+                Variant::Pcf | Variant::ObjectId | Variant::Moments => BLUR,
+                Variant::Hard | Variant::Pcss => Support::Exact,
+            },
             Capability::Sun | Capability::SphereLight | Capability::RectLight | Capability::DiskLight => {
-                CENTRE
+                match variant {
+                    Variant::Pcss => MEAN,
+                    Variant::Hard => CENTRE,
+                    Variant::Pcf | Variant::ObjectId | Variant::Moments => BLUR,
+                }
             }
             Capability::AlphaMask | Capability::TriangleSoup | Capability::FreePoints => Support::Exact,
             Capability::Gpu if !cfg!(feature = "gpu") => {

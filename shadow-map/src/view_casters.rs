@@ -11,10 +11,11 @@ use scene_core::{Camera, Light, Scene};
 
 use crate::light_views::LightView;
 
-/// The region of those lines for surfaces that `camera` sees, in maps of `map_size` texels a side.
+/// The region of those lines for surfaces that `camera` sees, in maps of `map_size` texels a side, where a lookup
+/// reads texels up to `reach` beside the receiver's own.
 ///
-/// Receivers are grown by the diagonal of the largest texel at the distance of the farthest receiver: a texel's
-/// centre is half of it away at most, and the rasteriser's snapping
+/// Receivers are grown by 1 + `reach` diagonals of the largest texel at the distance of the farthest receiver: a
+/// texel's centre is half of one away from the place that is looked up at most, and the rasteriser's snapping
 /// ([`scene_core::raster::DEPTH_POSITION_ERROR`]) far less.
 pub fn looked_up(
     scene: &Scene,
@@ -22,6 +23,7 @@ pub fn looked_up(
     camera: &Camera,
     views: &[LightView],
     map_size: u32,
+    reach: f64,
 ) -> CasterRegion {
     let receivers = Receivers::seen_by(scene, camera, light);
     let center = light.center();
@@ -31,5 +33,5 @@ pub fn looked_up(
     };
     let half_diagonal = views.iter().map(|view| view.half_diagonal_at(distance)).fold(0.0, f64::max);
     let texel = half_diagonal * 2.0 / f64::from(map_size.max(1));
-    CasterRegion::along(scene, &receivers.grown(texel), center)
+    CasterRegion::along(scene, &receivers.grown(texel * (1.0 + reach)), center)
 }
