@@ -143,7 +143,8 @@ impl MomentMap {
         let size = map.map.width as usize;
         // An even window has half a texel at both ends.
         let half = window / 2;
-        let weight = |step: usize| if window % 2 == 0 && (step == 0 || step == 2 * half) { 0.5 } else { 1.0 };
+        let weight =
+            |step: usize| if window.is_multiple_of(2) && (step == 0 || step == 2 * half) { 0.5 } else { 1.0 };
         let (border, side) = (half + 1, size + 2);
         let wide = size + 2 * border;
         let at = |index: usize| index as i32 - border as i32;

@@ -5,7 +5,7 @@
 //!    ([`LightCone`](crate::light_cone::LightCone)): the receiver's own surface, which lies at its horizon, never does.
 //! 2. *Penumbra.* Their mean distance gives one plane that stands for all of them. With t the share of the way to the
 //!    light, the line to the light's point s crosses it at p + t·(s − p), and a map from the light's centre holds that
-//!    point t/(1 − t)·s beside the receiver, s counted from the centre: the penumbra formula w·(z_r − z_b)/z_b.
+//!    point t/(1 − t)·s beside the receiver, s counted from the centre: the penumbra formula `w·(z_r − z_b)/z_b`.
 //! 3. *Filter.* Points of the light, in equal shares of V, are looked up there: the filter has the light's shape, and is
 //!    as wide as the penumbra is. Each is moved within a texel at random, which blurs the map's own steps.
 //!
@@ -147,10 +147,10 @@ impl<'a> Pcss<'a> {
             }
         }
         // A cone narrower than a texel may hold no texel's centre.
-        if blockers.weight == 0.0 {
-            if let Some(own) = taps.own_blocker() {
-                blockers.add(cone.locate(own.point).z, self.parallel);
-            }
+        if blockers.weight == 0.0
+            && let Some(own) = taps.own_blocker()
+        {
+            blockers.add(cone.locate(own.point).z, self.parallel);
         }
         blockers.mean()
     }
