@@ -9,7 +9,7 @@ use scene_core::technique::{ShadowTechnique, TechniqueError};
 
 use crate::args::{Backend, CompareArgs};
 use crate::backend::Side;
-use crate::compare::{Comparison, Entry, Refused, Truth, page, sheet, table};
+use crate::compare::{Comparison, Entry, Refused, Truth, page, sheet, skipped, table};
 use crate::console::Console;
 use crate::error::CliError;
 use crate::measure::Stand;
@@ -70,7 +70,9 @@ pub(crate) fn run(args: &CompareArgs, console: &Console) -> Result<(), CliError>
         console.note(&format!("not run: {}: {}", refused.technique, refused.why));
     }
     console.note(&format!("wrote {}", out.path().join("index.html").display()));
-    console.result(&comparison.report(), &format!("{}\n\n{}", comparison.facts(), table::text(&comparison)))
+    let (facts, table, skipped) =
+        (comparison.facts(), table::text(&comparison), skipped::footer(&comparison));
+    console.result(&comparison.report(), &format!("{facts}\n\n{table}{skipped}"))
 }
 
 /// A technique and where it runs.

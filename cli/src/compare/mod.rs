@@ -3,6 +3,7 @@
 pub(crate) mod html;
 pub(crate) mod page;
 pub(crate) mod sheet;
+pub(crate) mod skipped;
 pub(crate) mod table;
 
 use image::RgbImage;

@@ -8,6 +8,7 @@ use std::fmt::Write;
 use image::DynamicImage;
 
 use super::html::{data_uri, escape, fill};
+use super::skipped::lines;
 use super::table::{COLUMNS, cells, error_text, rows, sort_keys};
 use super::{Comparison, percent, thousands};
 use crate::error::{CliError, count_of};
@@ -27,6 +28,7 @@ pub(crate) fn page(comparison: &Comparison) -> Result<Vec<u8>, CliError> {
         ("valid", thousands(truth.valid)),
         ("thead", table_head()),
         ("tbody", table_body(comparison)),
+        ("skipped", skipped(comparison)),
         ("refused", refused(comparison)),
         ("scale", comparison.error_scale.to_string()),
         ("gallery", gallery(comparison)?),
@@ -100,6 +102,19 @@ fn table_body(comparison: &Comparison) -> String {
         body.push_str("</tr>\n");
     }
     body
+}
+
+/// What every run left out.
+fn skipped(comparison: &Comparison) -> String {
+    let item =
+        |(label, words): (&str, String)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(label), escape(&words));
+    let items: String = lines(comparison).into_iter().map(item).collect();
+    if items.is_empty() {
+        return items;
+    }
+    format!(
+        "<h3>Left out because it cannot change the image</h3>\n<dl class=\"words skipped\">\n{items}</dl>"
+    )
 }
 
 fn refused(comparison: &Comparison) -> String {

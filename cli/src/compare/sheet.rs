@@ -3,11 +3,13 @@
 use image::imageops::{self, FilterType};
 use image::{DynamicImage, Rgb as Pixel, RgbImage};
 
+use super::skipped::in_words;
 use super::table::{error_text, milliseconds};
 use super::{Comparison, Entry, percent, thousands};
 use crate::picture::canvas::{Canvas, TextStyle};
 use crate::picture::colour::Rgb;
 use crate::picture::error_map::{LEGEND_HEIGHT, LEGEND_WIDTH, NOTHING, draw_legend};
+use crate::report::RunReport;
 
 const PAPER: Rgb = [250, 250, 248];
 const INK: Rgb = [28, 30, 34];
@@ -25,7 +27,7 @@ pub(crate) fn sheet(comparison: &Comparison) -> RgbImage {
     let shaded = &comparison.truth.pictures.shaded;
     let (cell_width, cell_height) = cell_size(shaded.width(), shaded.height());
     let caption = TextStyle::Strong.line_height() + 6;
-    let row_height = caption + cell_height + 2 * TextStyle::Body.line_height() + GAP;
+    let row_height = caption + cell_height + 3 * TextStyle::Body.line_height() + GAP;
     let head = MARGIN + TextStyle::Title.line_height() + 2 * TextStyle::Body.line_height() + 6;
     let rows = 1 + comparison.entries.len() as u32;
     let foot = LEGEND_HEIGHT + comparison.refused.len() as u32 * TextStyle::Body.line_height();
@@ -116,7 +118,7 @@ impl Layout {
             }
         }
         let total = truth.report.prepare_ms + truth.report.shade_ms;
-        self.figures(canvas, top, &format!("{} ms", milliseconds(total)));
+        self.figures(canvas, top, &format!("{} ms", milliseconds(total)), &truth.report);
     }
 
     fn entry(&self, canvas: &mut Canvas, entry: &Entry, y: u32) {
@@ -141,7 +143,7 @@ impl Layout {
         if errors.missing > 0 {
             figures += &format!("   {} pixels without a value", thousands(errors.missing));
         }
-        self.figures(canvas, top, &figures);
+        self.figures(canvas, top, &figures, report);
     }
 
     fn caption(&self, canvas: &mut Canvas, y: u32, text: &str) {
@@ -149,9 +151,15 @@ impl Layout {
         canvas.text(MARGIN, y, &style.fit(text, self.inner), style, INK);
     }
 
-    fn figures(&self, canvas: &mut Canvas, top: u32, text: &str) {
+    /// Two lines: the figures, and what was left out.
+    fn figures(&self, canvas: &mut Canvas, top: u32, text: &str, report: &RunReport) {
         let style = TextStyle::Body;
-        canvas.text(MARGIN, top + self.cell_height + 6, &style.fit(text, self.inner), style, FAINT);
+        let mut y = top + self.cell_height + 6;
+        canvas.text(MARGIN, y, &style.fit(text, self.inner), style, FAINT);
+        if let Some(skipped) = in_words(report) {
+            y += style.line_height();
+            canvas.text(MARGIN, y, &style.fit(&format!("left out: {skipped}"), self.inner), style, FAINT);
+        }
     }
 
     /// Scales up by repeating pixels, so that they can be told apart, and down by averaging.

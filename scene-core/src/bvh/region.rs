@@ -1,4 +1,6 @@
-//! Whether any triangle reaches into a convex region.
+//! Which triangles reach into a convex region, and whether any does.
+
+use std::ops::ControlFlow;
 
 use glam::DVec3;
 
@@ -28,17 +30,22 @@ impl HalfSpace {
     }
 }
 
+/// Entries of a walk; deeper trees than this are not searched. One of a million triangles uses about 60.
+const STACK: usize = 256;
+
 impl Bvh {
-    /// Whether every triangle lies wholly outside one of the half-spaces, so that none reaches into the region that
-    /// they have in common. Errs to `false`: a triangle may miss the region and yet not lie outside a single one.
-    /// Products are rounded in f64; a half-space that is not finite tells nothing.
-    pub fn misses(&self, region: &[HalfSpace]) -> bool {
-        /// Deeper trees than this are not searched; one of a million triangles uses about 60.
-        const STACK: usize = 256;
-        let Tree { root, nodes, blocks, stack, .. } = &self.tree;
-        let Some(root) = *root else { return true };
+    /// Calls `visit` with the triangles (as indices into [`Scene::triangles`](crate::Scene::triangles)) that may reach
+    /// into the region that the half-spaces have in common: all but those that lie wholly outside one of them, as in
+    /// [`Bvh::misses`]. Breaks if `visit` does, and if the tree is too deep to be searched.
+    pub fn visit_region(
+        &self,
+        region: &[HalfSpace],
+        mut visit: impl FnMut(u32) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let Tree { root, nodes, blocks, triangles, stack, .. } = &self.tree;
+        let Some(root) = *root else { return ControlFlow::Continue(()) };
         if *stack > STACK {
-            return false;
+            return ControlFlow::Break(());
         }
         let mut links = [Link::NONE; STACK];
         links[0] = root;
@@ -54,8 +61,10 @@ impl Bvh {
                         (side.misses_boxes(a, a), side.misses_boxes(b, b), side.misses_boxes(c, c));
                     missed = std::array::from_fn(|lane| missed[lane] | (a[lane] & b[lane] & c[lane]));
                 }
-                if !missed[..link.count()].iter().all(|&missed| missed) {
-                    return false;
+                for (&triangle, missed) in triangles[link.index()].iter().zip(missed).take(link.count()) {
+                    if !missed {
+                        visit(triangle)?;
+                    }
                 }
                 continue;
             }
@@ -71,6 +80,13 @@ impl Bvh {
                 }
             }
         }
-        true
+        ControlFlow::Continue(())
+    }
+
+    /// Whether every triangle lies wholly outside one of the half-spaces, so that none reaches into the region that
+    /// they have in common. Errs to `false`: a triangle may miss the region and yet not lie outside a single one.
+    /// Products are rounded in f64; a half-space that is not finite tells nothing.
+    pub fn misses(&self, region: &[HalfSpace]) -> bool {
+        self.visit_region(region, |_| ControlFlow::Break(())).is_continue()
     }
 }

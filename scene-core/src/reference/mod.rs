@@ -5,10 +5,10 @@
 
 mod exact;
 mod occlusion;
-mod outline;
+pub(crate) mod outline;
 mod proof;
 mod sampled;
-mod shaft;
+pub(crate) mod shaft;
 mod tiles;
 mod valid;
 

@@ -27,7 +27,7 @@ const WIDEST: f64 = 4.0;
 
 /// Points whose hull holds a light.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LightOutline {
+pub(crate) struct LightOutline {
     points: [LightPoint; OUTLINE],
     count: usize,
     /// What is left around the light.
@@ -101,7 +101,7 @@ impl LightOutline {
 
     /// An outline that holds for all receivers no farther from 0 than `receiver` or `magnitude`: of a sphere, the cube
     /// around it.
-    pub(super) fn of_all(light: &Light, receiver: Vec3, magnitude: f32) -> Option<Self> {
+    pub(crate) fn of_all(light: &Light, receiver: Vec3, magnitude: f32) -> Option<Self> {
         let Light::Sphere { center, radius } = *light else {
             return Self::new(light, receiver, magnitude);
         };
@@ -126,13 +126,19 @@ impl LightOutline {
         }
     }
 
-    pub(super) fn points(&self) -> &[LightPoint] {
+    pub(crate) fn points(&self) -> &[LightPoint] {
         &self.points[..self.count]
+    }
+
+    /// What is left around the light: a length, or a sine for a distant one. More than heights that are computed in
+    /// f32 from samples are off by.
+    pub(crate) fn margin(&self) -> f64 {
+        self.margin
     }
 
     /// The least and the largest height of the light above the plane through `position`, and a bound of the error
     /// of heights that are computed in f32 from samples.
-    pub(super) fn heights(&self, position: Vec3, normal: Vec3) -> (f64, f64, f64) {
+    pub(crate) fn heights(&self, position: Vec3, normal: Vec3) -> (f64, f64, f64) {
         let normal = normal.as_dvec3();
         let heights = self.points().iter().map(|point| match *point {
             LightPoint::At(at) => normal.dot(at.as_dvec3() - position.as_dvec3()),

@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1.0 / (1_u32 << 23) as f64;
 
 /// Half-spaces that together hold every way from some receivers to a light.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LightShaft {
+pub(crate) struct LightShaft {
     sides: [HalfSpace; SIDES],
     count: usize,
 }
@@ -43,6 +43,14 @@ impl LightShaft {
     /// `magnitude` is the largest coordinate of the scene.
     pub(super) fn new(origins: &[Vec3], normal: Vec3, light: &LightOutline, magnitude: f32) -> Self {
         let bounds = Aabb::from_points(origins.iter().copied());
+        let down = -normal.as_dvec3();
+        let (offset, _) = farthest(origins.iter().map(|origin| origin.as_dvec3()), down);
+        Self::between(&bounds, HalfSpace { normal: down, offset }, light, magnitude)
+    }
+
+    /// The shaft from all origins in `bounds` that `floor` holds as well, to the light. What lies below the floor of
+    /// surfaces that are seen from above is not in it.
+    pub(crate) fn between(bounds: &Aabb, floor: HalfSpace, light: &LightOutline, magnitude: f32) -> Self {
         let largest = f64::from(bounds.magnitude().max(magnitude));
         let corners = bounds.corners().map(|corner| corner.as_dvec3());
         let is_distant = matches!(light.points()[0], LightPoint::Towards(_));
@@ -67,8 +75,7 @@ impl LightShaft {
                 shaft.count += 1;
             }
         };
-        let down = -normal.as_dvec3();
-        add(down, farthest(origins.iter().map(|origin| origin.as_dvec3()), down).0);
+        add(floor.normal, floor.offset);
         if !is_distant {
             let along = axis.normalize_or_zero();
             add(along, farthest(corners.into_iter(), along).0);
@@ -94,7 +101,7 @@ impl LightShaft {
         shaft
     }
 
-    pub(super) fn sides(&self) -> &[HalfSpace] {
+    pub(crate) fn sides(&self) -> &[HalfSpace] {
         &self.sides[..self.count]
     }
 }

@@ -12,7 +12,7 @@ use crate::{Report, Scene};
 const CHUNK: usize = 256;
 
 /// Bounds of the casters' triangles by runs of 256. It holds as long as the scene does.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct CasterChunks {
     /// Per object where its chunks start in `bounds`, and the end of the last one's.
     starts: Vec<usize>,

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::extent::{LightExtent, reach_of};
-use super::{HalfSpace, Polyhedron, Side};
+use super::{HalfSpace, Polyhedron, Side, depth_slice, pyramid};
 use crate::geometry::Aabb;
 use crate::light::LightPoint;
 use crate::{Camera, Light, Scene};
@@ -65,6 +65,22 @@ impl Receivers {
         Self { region, margin }
     }
 
+    /// Those of the receivers inside a volume: a cascade's ([`depth_slice`](super::depth_slice)), a cube face's or
+    /// any other map's ([`pyramid`](super::pyramid)), or half-spaces of the caller's own. What lies on a border
+    /// belongs to both sides, and so does what rounding could put there.
+    ///
+    /// A half-space that is not finite leaves everything in.
+    #[must_use]
+    pub fn inside(mut self, volume: &[HalfSpace]) -> Self {
+        volume.iter().for_each(|plane| self.region.clip(plane.grown(self.margin)));
+        self
+    }
+
+    /// Whether a receiver inside `bounds` may be one of these. Never false for one that is.
+    pub fn touches(&self, bounds: &Aabb) -> bool {
+        self.region.intersects(bounds)
+    }
+
     /// Whether nothing is seen that could be in shadow.
     pub fn is_empty(&self) -> bool {
         self.region.is_empty()
@@ -99,25 +115,9 @@ fn margin(bounds: Aabb, eye: Vec3, light: &Light) -> f64 {
 
 /// The half-spaces of a camera's view, near and far included; none for a camera that is not finite.
 fn frustum(camera: &Camera) -> Vec<HalfSpace> {
-    let axes = camera.world_from_view_rotation().as_dmat3();
-    let (eye, tan) = (camera.eye.as_dvec3(), camera.tan_half_fov().as_dvec2());
-    let ray = |x: f64, y: f64| axes * DVec3::new(x * tan.x, y * tan.y, -1.0);
-    let corners = [ray(-1.0, -1.0), ray(1.0, -1.0), ray(1.0, 1.0), ray(-1.0, 1.0)];
-    // Counter-clockwise as the camera sees them: a corner's ray × the next one's points out.
-    let mut planes: Vec<_> = (0..4)
-        .map(|i| {
-            let normal = corners[i].cross(corners[(i + 1) % 4]).normalize_or_zero();
-            HalfSpace { normal, offset: normal.dot(eye) }
-        })
-        .collect();
-    let forward = axes.x_axis.cross(axes.y_axis).normalize_or_zero() * -1.0;
-    let depth_of = |t: f32| forward.dot(eye + axes * DVec3::new(0.0, 0.0, -f64::from(t)));
-    planes.push(HalfSpace { normal: -forward, offset: -depth_of(camera.near) });
-    if camera.far.is_finite() {
-        planes.push(HalfSpace { normal: forward, offset: depth_of(camera.far) });
-    }
-    planes
-        .retain(|plane| plane.normal.is_finite() && plane.normal != DVec3::ZERO && plane.offset.is_finite());
+    let tan = camera.tan_half_fov();
+    let mut planes = pyramid(camera.eye, camera.world_from_view_rotation(), -tan, tan);
+    planes.extend(depth_slice(camera, camera.near, camera.far));
     planes
 }
 
@@ -127,6 +127,13 @@ fn slanted() -> impl Iterator<Item = DVec3> {
         let v = DVec3::new(f64::from(i % 3 - 1), f64::from(i / 3 % 3 - 1), f64::from(i / 9 - 1));
         (v.abs().element_sum() > 1.0).then(|| v.normalize())
     })
+}
+
+/// The ids of the objects that have a part among `receivers`: in a cascade, say, or in a face of a cube. The others need
+/// not be asked about there.
+pub fn objects_among(scene: &Scene, receivers: &Receivers) -> Vec<u32> {
+    let objects = (0..).zip(scene.objects());
+    objects.filter(|(_, o)| o.flags.receives && receivers.touches(&o.bounds)).map(|(id, _)| id).collect()
 }
 
 /// The ids of the objects that receive shadows and that `light` may reach: all of them but those outside the cone

@@ -9,14 +9,14 @@ use crate::{GBuffer, Scene};
 /// Side of a tile in pixels.
 pub const TILE: u32 = 16;
 
-/// How a light lies to all that a tile sees. Shafts through the casters decide it.
+/// How a light lies to all that a tile sees: see [`classify_tiles`](super::classify_tiles).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TileClass {
-    /// Nothing is seen there.
+    /// No receiver is seen there.
     Empty,
-    /// Proved: every pixel that sees a surface has V = 1.
+    /// Proved: every pixel that sees a receiver has V = 1.
     Lit,
-    /// Proved: every pixel that sees a surface has V = 0.
+    /// Proved: every pixel that sees a receiver has V = 0.
     Umbra,
     /// Anything else.
     #[default]

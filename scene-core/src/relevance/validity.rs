@@ -9,7 +9,8 @@ pub struct Change<'a> {
     pub camera: bool,
     /// The light moved or changed its extent.
     pub light: bool,
-    /// Ids of objects whose vertices moved. Objects that came or went make another scene: everything is remade.
+    /// Ids of objects whose vertices moved. Objects that came or went, or changed their flags or mask, make another
+    /// scene: everything is remade.
     pub objects: &'a [u32],
 }
 
@@ -26,7 +27,7 @@ pub struct Remake {
     /// [`CasterRegion`](super::CasterRegion), the choice of casters by it, and every preparation that depends on the
     /// camera.
     pub view_preparation: bool,
-    /// The visibility image.
+    /// The visibility image, and with it the [`TileClasses`](super::TileClasses).
     pub visibility: bool,
 }
 
