@@ -46,15 +46,18 @@ pub(crate) fn trace(
         let variant = count_of(args.samples as usize, "sample") + " a pixel";
         (variant, json!({ "samples": args.samples, "seed": seed }))
     };
+    let (scene, light) = (&view.setup.scene, view.light());
+    let mut report = Report::default();
+    let start = Instant::now();
+    let bvh = {
+        let _working = console.working(format!("building the tree of {} triangles", scene.caster_count()));
+        report.time("prepare.bvh", |_| Bvh::casters(scene))
+    };
     let bar = console.progress(format!("ground truth, {variant}"));
     let progress = |fraction: f32| {
         bar.set(fraction);
         ControlFlow::Continue(())
     };
-    let (scene, light) = (&view.setup.scene, view.light());
-    let mut report = Report::default();
-    let start = Instant::now();
-    let bvh = report.time("prepare.bvh", |_| Bvh::casters(scene));
     report.bytes = bvh.bytes() as u64;
     let prepare_ms = milliseconds_since(start);
     let start = Instant::now();

@@ -14,8 +14,8 @@ use crate::light::LightPoint;
 /// Directions along which planes touch receivers and light.
 const DIRECTIONS: usize = 7;
 
-/// Two planes a direction, the tangent plane and the one behind the light.
-const SIDES: usize = 2 * DIRECTIONS + 2;
+/// Two planes a direction, the tangent plane, the one behind the light and a flat light's own.
+const SIDES: usize = 2 * DIRECTIONS + 3;
 
 /// Steps in which a plane is turned until it touches both; it holds both at any step.
 const STEPS: usize = 3;
@@ -79,6 +79,14 @@ impl LightShaft {
         if !is_distant {
             let along = axis.normalize_or_zero();
             add(along, farthest(corners.into_iter(), along).0);
+            // A flat light's own plane keeps out what it hangs from. The first points are corners of its outline in
+            // their order, whatever its kind.
+            let [a, b, c] = [0, 1, 2].map(|i| points().nth(i).unwrap_or(middle));
+            let across = (b - a).cross(c - a).normalize_or_zero();
+            let behind = if across.dot(axis) < 0.0 { -across } else { across };
+            if behind != DVec3::ZERO {
+                add(behind, farthest(corners.into_iter(), behind).0);
+            }
         }
         let mut edges = points();
         let edge = edges.nth(1).unwrap_or(middle) - points().next().unwrap_or(middle);
