@@ -199,7 +199,8 @@ impl Beam {
                     first = Some(origin);
                     group.normal = normal;
                 }
-                group.is_unsound |= !(origin.abs().max_element() <= REACH * self.magnitude);
+                let is_near = origin.is_finite() && origin.abs().max_element() <= REACH * self.magnitude;
+                group.is_unsound |= !is_near;
                 group.origins = group.origins.with_point(origin);
                 group.lowest = group.lowest.min(group.normal.as_dvec3().dot(origin.as_dvec3()));
                 last = origin;
