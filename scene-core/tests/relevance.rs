@@ -239,7 +239,7 @@ fn a_volume_of_no_sense_leaves_every_receiver_in() {
     for planes in nonsense {
         assert_eq!(all.clone().inside(&planes).region().volume(), volume);
     }
-    let behind = all.clone().inside(&depth_slice(&anywhere(), -3.0, -2.0));
+    let behind = all.inside(&depth_slice(&anywhere(), -3.0, -2.0));
     assert!(objects_among(&scene, &behind).is_empty() && behind.is_empty());
 }
 
