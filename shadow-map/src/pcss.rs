@@ -108,7 +108,7 @@ impl<'a> Pcss<'a> {
     ) -> Option<f32> {
         let mut blockers = Blockers::default();
         let mut ask = |stored: Option<Stored>| {
-            let located = stored.map(|stored| cone.locate(stored.point));
+            let located = stored.map(|stored| cone.locate(taps.point(&stored)));
             if let Some(located) = located.filter(|&located| cone.contains(located)) {
                 blockers.add(located.z, self.parallel);
             }
@@ -150,7 +150,7 @@ impl<'a> Pcss<'a> {
         if blockers.weight == 0.0
             && let Some(own) = taps.own_blocker()
         {
-            blockers.add(cone.locate(own.point).z, self.parallel);
+            blockers.add(cone.locate(taps.point(&own)).z, self.parallel);
         }
         blockers.mean()
     }

@@ -49,8 +49,6 @@ pub struct Stored {
     pub view: usize,
     /// Its texel in the view's map.
     pub index: usize,
-    /// Its point at the texel's centre, world space.
-    pub point: Vec3,
     /// Reversed depth.
     pub depth: f32,
 }
@@ -142,7 +140,7 @@ impl<'m> Taps<'m> {
             let index = row as usize * size as usize + column as usize;
             let depth = map.map.depth[index];
             let rises = depth > 0.0 && self.plane.rise(column as f32, row as f32, depth) > 0.0;
-            rises.then(|| stored(map, self.view, index, depth))
+            rises.then(|| Stored { view: self.view, index, depth })
         } else {
             self.risen_beside(column, row)
         }
@@ -176,7 +174,18 @@ impl<'m> Taps<'m> {
         let plane =
             if view == self.view { self.plane } else { TexelPlane::new(&map.view, size, &self.receiver) };
         let rises = depth > 0.0 && plane.rise(column as f32, row as f32, depth) > 0.0;
-        rises.then(|| stored(map, view, index, depth))
+        rises.then(|| Stored { view, index, depth })
+    }
+
+    /// The stored point, at its texel's centre, in world space.
+    #[inline]
+    pub fn point(&self, stored: &Stored) -> Vec3 {
+        let map = &self.maps.maps.maps[stored.view];
+        let size = map.map.width as usize;
+        let texel = 2.0 / size as f32;
+        let (column, row) = (stored.index % size, stored.index / size);
+        let ndc = Vec2::new((column as f32 + 0.5) * texel - 1.0, 1.0 - (row as f32 + 0.5) * texel);
+        map.view.unproject(ndc, stored.depth)
     }
 
     /// The triangle of a stored surface.
@@ -196,7 +205,7 @@ impl<'m> Taps<'m> {
     pub fn is_near(&self, stored: &Stored) -> bool {
         let map = &self.maps.maps.maps[stored.view];
         let texel = map.view.half_diagonal(stored.depth) * (2.0 / map.map.width as f32);
-        let to_stored = stored.point - self.receiver.point;
+        let to_stored = self.point(stored) - self.receiver.point;
         let along = to_stored.dot(self.to_light);
         let lateral = (to_stored.length_squared() - along * along).max(0.0).sqrt();
         along <= (2.0 * lateral).max(texel) * self.slope
@@ -230,13 +239,4 @@ impl<'m> Taps<'m> {
             blocked
         })
     }
-}
-
-#[inline]
-fn stored(map: &ShadowMapView, view: usize, index: usize, depth: f32) -> Stored {
-    let size = map.map.width as usize;
-    let texel = 2.0 / size as f32;
-    let (column, row) = (index % size, index / size);
-    let ndc = Vec2::new((column as f32 + 0.5) * texel - 1.0, 1.0 - (row as f32 + 0.5) * texel);
-    Stored { view, index, point: map.view.unproject(ndc, depth), depth }
 }

@@ -194,3 +194,45 @@ fn filters_cross_the_borders_of_faces() {
     // Both are estimates by 64 points, each off by 1/8 in V at worst and by far less where the light is whole.
     assert!(rmse < 0.03, "{rmse}");
 }
+
+/// A square over the ground, from a sun at many angles: every pixel farther from the shadow's outline than the filter
+/// reaches is wholly lit or wholly dark. `moments` is a bound of V from above and is not asked in the shadow.
+#[test]
+fn shadows_are_whole_away_from_their_edges() {
+    for scale in [1e-3, 1.0, 1e4] {
+        let height = 0.5 * scale;
+        let caster = square("caster", Vec3::Y * height, 1.0 * scale);
+        let scene = scene_of(&[square("ground", Vec3::ZERO, 4.0 * scale), caster]);
+        let camera = camera(Vec3::new(1.0, 3.0, 5.0) * scale, Vec3::new(0.0, 0.0, 0.5) * scale, scale);
+        let gbuffer = raster::render_gbuffer(&scene, &camera);
+        for degrees in [0.0f32, 30.0, 60.0, 75.0] {
+            let tilt = degrees.to_radians();
+            let angular_radius = 0.005;
+            let direction = Vec3::new(tilt.sin() * 0.8, -tilt.cos(), tilt.sin() * 0.6);
+            let light = Light::Directional { direction, angular_radius };
+            let shift = direction * (height / tilt.cos());
+            for map_size in [64, 256, 1024] {
+                for params in settings() {
+                    let params = ShadowMapParams { map_size, ..params };
+                    let visibility = shade(&scene, &light, &gbuffer, params);
+                    // The map spans the square's diagonal at most; a texel's footprint is stretched by the slope. The
+                    // filter reaches half its width and a texel, the penumbra half of its own.
+                    let texel = 2.0 * 2f32.sqrt() * scale / map_size as f32 * 2f32.sqrt() / tilt.cos();
+                    let penumbra = height / tilt.cos().powi(2) * angular_radius * 1.05;
+                    let reach = texel * (params.filter as f32 * 0.5 + 1.5) + penumbra;
+                    for pixel in (0..gbuffer.pixel_count()).filter(|&i| gbuffer.object[i] == 0) {
+                        let on_caster = gbuffer.position[pixel] - shift;
+                        let outside = on_caster.x.abs().max(on_caster.z.abs()) - scale;
+                        let v = visibility.values[pixel];
+                        let is_right = if outside > reach {
+                            v > 1.0 - 1.0 / 255.0
+                        } else {
+                            outside >= -reach || v == 0.0 || params.variant == Variant::Moments
+                        };
+                        assert!(is_right, "{v}, {outside} outside, {degrees}°, scale {scale}: {params:?}");
+                    }
+                }
+            }
+        }
+    }
+}
