@@ -113,11 +113,13 @@ pub(crate) struct TruthArgs {
 #[command(after_help = "\
 Examples:
   gnomon compare dragon.obj
+  gnomon compare dragon.obj --variants
   gnomon compare cornell --size 256x256 --out out/cornell
   gnomon compare scene.toml --techniques shadow-map,shadow-map@high --samples 1024
   gnomon compare chess --backend cpu,gpu
 
-Writes index.html (open it: a slider between any two images), contact-sheet.png, table.csv and report.json.
+Writes index.html (open it: a slider between any two images), contact-sheet.png, strip.png (the shaded images \
+alone), table.csv and report.json.
 
 Errors are taken over valid pixels: those whose surface faces the light (n·l > 0.05) with the whole light \
 above it. mae is the mean of |error|, rmse the root of its mean square, p99 its 99th percentile, pen_rmse the \
@@ -128,9 +130,12 @@ pub(crate) struct CompareArgs {
     pub(crate) scene: SceneArgs,
     #[command(flatten)]
     pub(crate) truth: TruthArgs,
-    /// Techniques, separated by commas; NAME@PRESET takes a preset [default: all, in every variant]
+    /// Techniques, separated by commas; NAME@PRESET takes a preset [default: all]
     #[arg(long, value_name = "A,B", value_delimiter = ',')]
     pub(crate) techniques: Vec<String>,
+    /// Every variant of each technique, not its default one alone
+    #[arg(long)]
+    pub(crate) variants: bool,
     /// Where techniques run; cpu,gpu shows both side by side
     #[arg(long, value_enum, value_name = "BACKEND", value_delimiter = ',', default_value = "auto")]
     pub(crate) backend: Vec<Backend>,

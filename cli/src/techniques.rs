@@ -38,9 +38,9 @@ pub(crate) fn variant_of(technique: &dyn ShadowTechnique) -> String {
 
 /// What `compare` runs: techniques in words of the command line, made.
 ///
-/// No words mean every technique in each of its variants, otherwise at its defaults. A word is `name` (every
-/// variant) or `name@preset` (that preset).
-pub(crate) fn chosen(words: &[String], seed: u64) -> Result<Vec<Chosen>, CliError> {
+/// No words mean every technique. A word is `name` or `name@preset`. Each is run in the variant that its settings
+/// name, or, with `every_variant`, in all of them.
+pub(crate) fn chosen(words: &[String], every_variant: bool, seed: u64) -> Result<Vec<Chosen>, CliError> {
     let all: Vec<String>;
     let words = if words.is_empty() {
         all = self::all().iter().map(|technique| technique.name().to_owned()).collect();
@@ -57,14 +57,13 @@ pub(crate) fn chosen(words: &[String], seed: u64) -> Result<Vec<Chosen>, CliErro
             let label = format!("{word} {}", variant_of(technique.as_ref()));
             Ok::<_, CliError>(Chosen { label, technique })
         };
-        let new = match variants(factory) {
-            Some(variants) if preset.is_none() => variants
-                .iter()
-                .map(|variant| make(&[("variant".to_owned(), (*variant).to_owned())]))
-                .collect::<Result<Vec<_>, _>>()?,
-            _ => vec![make(&[])?],
-        };
-        chosen.extend(new);
+        if every_variant && !variants(factory).is_empty() {
+            for variant in variants(factory) {
+                chosen.push(make(&[("variant".to_owned(), (*variant).to_owned())])?);
+            }
+        } else {
+            chosen.push(make(&[])?);
+        }
     }
     // The same thing named twice is run once.
     let mut seen = std::collections::BTreeSet::new();
@@ -80,11 +79,37 @@ pub(crate) struct Chosen {
     pub(crate) technique: Box<dyn ShadowTechnique>,
 }
 
-fn variants(factory: &dyn TechniqueFactory) -> Option<&'static [&'static str]> {
-    factory.settings().iter().find(|setting| setting.name == "variant").and_then(|setting| {
-        match setting.kind {
-            SettingKind::Choice(variants) => Some(variants),
+/// The variants of a technique; none if it has a single one.
+pub(crate) fn variants(factory: &dyn TechniqueFactory) -> &'static [&'static str] {
+    factory
+        .settings()
+        .iter()
+        .find_map(|setting| match setting.kind {
+            SettingKind::Choice(variants) if setting.name == "variant" => Some(variants),
             _ => None,
+        })
+        .unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_technique_runs_once_and_in_every_variant_if_asked() {
+        let labels = |words: &[&str], every_variant| -> Vec<String> {
+            let words: Vec<String> = words.iter().map(|&word| word.to_owned()).collect();
+            let chosen = chosen(&words, every_variant, 0).unwrap();
+            chosen.into_iter().map(|chosen| chosen.label).collect()
+        };
+        assert_eq!(labels(&[], false).len(), all().len());
+        let count = |factory: &&dyn TechniqueFactory| variants(*factory).len().max(1);
+        assert_eq!(labels(&[], true).len(), all().iter().map(count).sum::<usize>());
+        for factory in all() {
+            let default = factory.create(None, &[]).unwrap();
+            let label = format!("{} {}", factory.name(), variant_of(default.as_ref()));
+            assert_eq!(labels(&[factory.name()], false), [label.clone()]);
+            assert!(labels(&[factory.name()], true).contains(&label));
         }
-    })
+    }
 }

@@ -9,7 +9,7 @@ use scene_core::technique::{ShadowTechnique, TechniqueError};
 
 use crate::args::{Backend, CompareArgs};
 use crate::backend::Side;
-use crate::compare::{Comparison, Entry, Refused, Truth, page, sheet, skipped, table};
+use crate::compare::{Comparison, Entry, Refused, Truth, page, sheet, skipped, strip, table};
 use crate::console::Console;
 use crate::error::CliError;
 use crate::measure::Stand;
@@ -22,7 +22,7 @@ use crate::{backend, ground_truth, picture, scene_source, techniques};
 const RUNS: usize = 3;
 
 pub(crate) fn run(args: &CompareArgs, console: &Console) -> Result<(), CliError> {
-    let chosen = techniques::chosen(&args.techniques, args.scene.seed)?;
+    let chosen = techniques::chosen(&args.techniques, args.variants, args.scene.seed)?;
     let gpu = backend::open(&args.backend)?;
     let plan = plan(chosen, &args.backend, gpu.is_some())?;
     let view = scene_source::view(&args.scene, console)?;
@@ -57,10 +57,12 @@ pub(crate) fn run(args: &CompareArgs, console: &Console) -> Result<(), CliError>
     {
         let _working = console.working("drawing");
         let sheet = picture::png(sheet::sheet(&comparison))?;
+        let strip = picture::small_png(&strip::strip(&comparison))?;
         let table = table::csv(&comparison)?;
         let page = page::page(&comparison)?;
         out.write(|to| {
             write::bytes(&to.join("contact-sheet.png"), &sheet)?;
+            write::bytes(&to.join("strip.png"), &strip)?;
             write::bytes(&to.join("table.csv"), &table)?;
             write::json(&to.join("report.json"), &comparison.report())?;
             write::bytes(&to.join("index.html"), &page)

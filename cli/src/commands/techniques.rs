@@ -101,25 +101,38 @@ fn as_json(
     for preset in factory.presets() {
         presets.insert(preset.to_owned(), factory.create(Some(preset), &[])?.settings());
     }
-    let takes: serde_json::Map<String, Value> = support
-        .iter()
-        .map(|(name, support)| {
-            let (answer, why) = match *support {
-                Support::Exact => ("exact", None),
-                Support::Approximate(why) => ("approximate", Some(why)),
-                Support::Unsupported(why) => ("unsupported", Some(why)),
-            };
-            (name.clone(), json!({ "support": answer, "why": why }))
-        })
-        .collect();
+    // A technique without the setting has one variant, made without naming it.
+    let names = techniques::variants(factory);
+    let overrides = names.iter().map(|name| vec![("variant".to_owned(), (*name).to_owned())]);
+    let overrides: Vec<_> = if names.is_empty() { vec![Vec::new()] } else { overrides.collect() };
+    let mut variants = Vec::new();
+    for overrides in overrides {
+        let technique = factory.create(None, &overrides)?;
+        let takes = takes(&self::support(&technique.describe()));
+        variants.push(json!({ "name": techniques::variant_of(technique.as_ref()), "takes": takes }));
+    }
     Ok(json!({
         "name": factory.name(),
         "summary": factory.summary(),
-        "takes": takes,
+        "takes": takes(support),
+        "variants": variants,
         "settings": settings,
         "preset_order": factory.presets(),
         "presets": presets,
     }))
+}
+
+/// How each input is served, by name.
+fn takes(support: &[(String, Support)]) -> Value {
+    let answer = |(name, support): &(String, Support)| {
+        let (answer, why) = match *support {
+            Support::Exact => ("exact", None),
+            Support::Approximate(why) => ("approximate", Some(why)),
+            Support::Unsupported(why) => ("unsupported", Some(why)),
+        };
+        (name.clone(), json!({ "support": answer, "why": why }))
+    };
+    Value::Object(support.iter().map(answer).collect())
 }
 
 /// A JSON value as one would type it.

@@ -4,6 +4,7 @@ pub(crate) mod html;
 pub(crate) mod page;
 pub(crate) mod sheet;
 pub(crate) mod skipped;
+pub(crate) mod strip;
 pub(crate) mod table;
 
 use image::RgbImage;

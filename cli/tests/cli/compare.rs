@@ -10,7 +10,10 @@ fn compare(bench: &Workbench, more: &[&str]) {
 fn one_folder_holds_everything() {
     let bench = Workbench::new();
     compare(&bench, &[]);
-    assert_eq!(bench.names("out/quads"), ["contact-sheet.png", "index.html", "report.json", "table.csv"]);
+    assert_eq!(
+        bench.names("out/quads"),
+        ["contact-sheet.png", "index.html", "report.json", "strip.png", "table.csv"]
+    );
     let sheet = image::open(bench.path("out/quads/contact-sheet.png")).unwrap();
     // Three columns of the smallest cell, and a row for ground truth and for the technique.
     assert!(sheet.width() >= 3 * 256 && sheet.height() >= 2 * 170, "{} x {}", sheet.width(), sheet.height());

@@ -19,6 +19,11 @@ fn techniques_tell_their_settings() {
         let takes = technique["takes"].as_object().unwrap();
         assert!(takes.values().any(|answer| answer["support"] != "unsupported"));
         assert!(takes.values().all(|answer| answer["support"] == "exact" || answer["why"].is_string()));
+        let variants = technique["variants"].as_array().unwrap();
+        let choices = settings.iter().find(|setting| setting["name"] == "variant");
+        let choices = choices.map_or(1, |setting| setting["range"].as_array().unwrap().len());
+        assert_eq!(variants.len(), choices);
+        assert!(variants.iter().all(|variant| variant["takes"].as_object().unwrap().len() == takes.len()));
         let presets = technique["presets"].as_object().unwrap();
         assert_eq!(presets.len(), technique["preset_order"].as_array().unwrap().len());
         assert!(presets.values().all(|preset| preset.as_object().unwrap().len() == settings.len()));
