@@ -66,7 +66,7 @@ fn planted_differences_fail() -> Result<(), Failed> {
             "thirteen wrong pixels",
             change(|i, v| {
                 if (200..213).contains(&i) {
-                    *v = 1.0 - *v
+                    *v = 1.0 - *v;
                 }
             }),
         ),
@@ -74,7 +74,7 @@ fn planted_differences_fail() -> Result<(), Failed> {
             "a column that sees nothing",
             change(|i, v| {
                 if i % 128 == 5 {
-                    *v = f32::NAN
+                    *v = f32::NAN;
                 }
             }),
         ),
