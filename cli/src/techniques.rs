@@ -108,7 +108,7 @@ mod tests {
         for factory in all() {
             let default = factory.create(None, &[]).unwrap();
             let label = format!("{} {}", factory.name(), variant_of(default.as_ref()));
-            assert_eq!(labels(&[factory.name()], false), [label.clone()]);
+            assert_eq!(labels(&[factory.name()], false), std::slice::from_ref(&label));
             assert!(labels(&[factory.name()], true).contains(&label));
         }
     }
