@@ -1,7 +1,8 @@
 //! `cargo xtask ci`: everything CI checks. Cheap checks come first, so that a slip is told early.
 
 use crate::shell::{CheckError, cargo};
-use crate::{docs, shaders, tidy, vulkan};
+use crate::snapshots::Report;
+use crate::{docs, gallery, package, shaders, tidy, vulkan};
 
 pub(crate) fn run() -> Result<(), CheckError> {
     tidy::run()?;
@@ -14,9 +15,19 @@ pub(crate) fn run() -> Result<(), CheckError> {
     cargo(&[&["clippy", "--workspace", "--all-targets"][..], &deny].concat(), &[])?;
     cargo(&[&["clippy", "--workspace", "--all-targets", "--no-default-features"][..], &deny].concat(), &[])?;
     docs::run()?;
-    // Release speed with debug assertions and overflow checks. INSTA_UPDATE=no: a missing or changed
-    // snapshot fails, nothing is rewritten.
-    let mut environment = vec![("INSTA_UPDATE", "no"), ("INSTA_FORCE_PASS", "0")];
-    environment.extend(gpu.iter().map(|(name, value)| (*name, value.as_str())));
-    cargo(&["test", "--workspace", "--profile", "ci"], &environment)
+    package::run()?;
+    // Release speed with debug assertions and overflow checks. A missing or changed snapshot fails, nothing in the tree
+    // is rewritten; what differs is shown by a page.
+    let report = Report::new()?;
+    let environment = report.environment().into_iter().chain(gpu);
+    let environment: Vec<_> = environment.collect();
+    let environment: Vec<_> = environment.iter().map(|(name, value)| (*name, value.as_str())).collect();
+    let tested = cargo(&["test", "--workspace", "--profile", "ci"], &environment);
+    // Where a test failed others have not run, and asked for nothing.
+    let found = report.write(tested.is_ok())?;
+    tested?;
+    if let Some(finding) = found.first() {
+        return Err(CheckError::Failed(format!("{}: {}", finding.name(), finding.why())));
+    }
+    gallery::run_built(true)
 }

@@ -2,10 +2,15 @@
 //!
 //! `cargo xtask ci` runs them all, as CI does.
 
+mod bench;
 mod ci;
 mod docs;
+mod gallery;
+mod html;
+mod package;
 mod shaders;
 mod shell;
+mod snapshots;
 mod tidy;
 mod vulkan;
 
@@ -29,6 +34,28 @@ enum Command {
     Tidy,
     /// Links, validates and translates every shader, and holds it against the project's rules.
     Shaders,
+    /// Golden pictures and text snapshots; a failing run leaves a page with expected, actual and difference.
+    Snapshots {
+        /// Put what differs into the tree.
+        #[arg(long)]
+        accept: bool,
+    },
+    /// Makes the figures of the READMEs by the command.
+    Gallery {
+        /// Write nothing; a figure that is missing or stale is a failure.
+        #[arg(long)]
+        check: bool,
+    },
+    /// Packs every crate and builds it from its package.
+    Package,
+    /// Runs benches and collects their tables in target/bench.
+    Bench {
+        /// Crates or benches [default: all]
+        names: Vec<String>,
+        /// Arguments of the benches themselves, such as `-- --quick`
+        #[arg(last = true)]
+        arguments: Vec<String>,
+    },
     /// Builds the documentation with and without the feature `gpu`; a warning is a failure.
     Docs,
 }
@@ -39,6 +66,10 @@ fn main() -> ExitCode {
         Command::Tidy => tidy::run(),
         Command::Shaders => shaders::run(),
         Command::Docs => docs::run(),
+        Command::Snapshots { accept } => snapshots::run(accept),
+        Command::Gallery { check } => gallery::run(check),
+        Command::Package => package::run(),
+        Command::Bench { names, arguments } => bench::run(&names, &arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,7 +1,7 @@
 //! Running cargo and reading the tree.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use thiserror::Error;
@@ -28,6 +28,14 @@ pub(crate) enum CheckError {
         /// Why not.
         source: std::io::Error,
     },
+    /// A file could not be written.
+    #[error("cannot write {path}: {source}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
     /// Project rules are broken, one a line.
     #[error("{} project rules broken:\n{}", .0.len(), .0.join("\n"))]
     Rules(Vec<String>),
@@ -42,18 +50,61 @@ pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
 }
 
+/// The build folder.
+pub(crate) fn target() -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |folder| root().join(folder))
+}
+
+fn cargo_program() -> String {
+    std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned())
+}
+
 /// Runs `cargo` in the workspace with `arguments` and extra environment, and prints how long it took.
 pub(crate) fn cargo(arguments: &[&str], environment: &[(&str, &str)]) -> Result<(), CheckError> {
+    cargo_at(root(), arguments, environment)
+}
+
+/// [`cargo`] in another folder.
+pub(crate) fn cargo_at(
+    folder: &Path,
+    arguments: &[&str],
+    environment: &[(&str, &str)],
+) -> Result<(), CheckError> {
     let line = format!("cargo {}", arguments.join(" "));
     eprintln!("\n==> {line}");
     let start = Instant::now();
-    let program = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
+    let program = cargo_program();
     let status = Command::new(&program)
         .args(arguments)
         .envs(environment.iter().copied())
-        .current_dir(root())
+        .current_dir(folder)
         .status()
         .map_err(|source| CheckError::Start { program, source })?;
     eprintln!("    {:.1} s", start.elapsed().as_secs_f64());
     if status.success() { Ok(()) } else { Err(CheckError::Failed(line)) }
+}
+
+/// Runs a program of ours in the workspace, its stdout left out.
+pub(crate) fn run_program(program: &Path, arguments: &[&str]) -> Result<(), CheckError> {
+    let name = program.display().to_string();
+    output_of(&name, arguments).map(drop)
+}
+
+/// What `cargo` prints on stdout; its messages go to where ours go.
+pub(crate) fn cargo_output(arguments: &[&str]) -> Result<String, CheckError> {
+    output_of(&cargo_program(), arguments)
+}
+
+/// What a program prints on stdout, run in the workspace.
+pub(crate) fn output_of(program: &str, arguments: &[&str]) -> Result<String, CheckError> {
+    let output = Command::new(program)
+        .args(arguments)
+        .current_dir(root())
+        .stderr(Stdio::inherit())
+        .output()
+        .map_err(|source| CheckError::Start { program: program.to_owned(), source })?;
+    if !output.status.success() {
+        return Err(CheckError::Failed(format!("{program} {}", arguments.join(" "))));
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }

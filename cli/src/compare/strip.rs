@@ -22,9 +22,10 @@ pub(crate) fn strip(comparison: &Comparison) -> RgbImage {
     let truth = &comparison.truth.pictures.shaded;
     let (width, height) = truth.dimensions();
     let mut cells = vec![("ground truth".to_owned(), comparison.truth.report.variant.clone(), truth)];
-    cells.extend(
-        comparison.entries.iter().map(|entry| (entry.label.clone(), figure(entry), &entry.pictures.shaded)),
-    );
+    let labels: Vec<&str> = comparison.entries.iter().map(|entry| entry.label.as_str()).collect();
+    for (entry, name) in comparison.entries.iter().zip(names(&labels)) {
+        cells.push((name, figure(entry), &entry.pictures.shaded));
+    }
     let count = cells.len() as u32;
     let across = across(count, width);
     let caption = TextStyle::Strong.line_height();
@@ -42,6 +43,15 @@ pub(crate) fn strip(comparison: &Comparison) -> RgbImage {
         canvas.text(x, below, &TextStyle::Body.fit(&figure, width), TextStyle::Body, FAINT);
     }
     canvas.into_image()
+}
+
+/// Names above the images: of several variants of one technique, what differs.
+fn names(labels: &[&str]) -> Vec<String> {
+    let first =
+        labels.first().and_then(|label| label.split_once(' ')).map(|(technique, _)| format!("{technique} "));
+    let shared =
+        first.filter(|first| labels.len() > 1 && labels.iter().all(|label| label.starts_with(first)));
+    labels.iter().map(|label| label[shared.as_ref().map_or(0, String::len)..].to_owned()).collect()
 }
 
 /// The error below an image: the one in penumbrae where there are some.
@@ -64,6 +74,14 @@ fn across(count: u32, width: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_shared_name_is_left_out() {
+        assert_eq!(names(&["a x", "a y"]), ["x", "y"]);
+        assert_eq!(names(&["a x", "ab y"]), ["a x", "ab y"]);
+        assert_eq!(names(&["a x"]), ["a x"]);
+        assert!(names(&[]).is_empty());
+    }
 
     #[test]
     fn images_are_spread_evenly_over_rows() {
