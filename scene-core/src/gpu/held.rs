@@ -105,9 +105,9 @@ pub mod binding {
     pub const IDS: BindingType = texture(TextureSampleType::Uint, TextureViewDimension::D2);
     /// `texture_2d_array<u32>`.
     pub const ID_LAYERS: BindingType = texture(TextureSampleType::Uint, TextureViewDimension::D2Array);
-    /// `texture_depth_2d`.
+    /// `texture_depth_2d`, for comparison samplers: its texels cannot be loaded in what GL understands.
     pub const DEPTH: BindingType = texture(TextureSampleType::Depth, TextureViewDimension::D2);
-    /// `texture_depth_2d_array`.
+    /// `texture_depth_2d_array`, likewise.
     pub const DEPTH_LAYERS: BindingType = texture(TextureSampleType::Depth, TextureViewDimension::D2Array);
     /// `sampler_comparison`.
     pub const COMPARISON: BindingType = BindingType::Sampler(wgpu::SamplerBindingType::Comparison);

@@ -1,6 +1,6 @@
 //! The GPU path: the stages of [`cpu`](crate::cpu) under the same names, recorded into the caller's encoder.
 //!
-//! `prepare.views` is the CPU's own code. `prepare.maps` draws the casters, depth and triangle a texel, into a layer
+//! `prepare.views` is the CPU's own code. `prepare.maps` draws the casters, the nearest triangle a texel, into a layer
 //! a view. `shade.lookup` asks the questions of [`receiver_plane`](crate::receiver_plane) in one full-screen pass.
 //!
 //! V differs from the CPU's only where the hardware's rasteriser gives a texel on a caster's outline to the other side
@@ -61,7 +61,7 @@ impl ShadowMapOnGpu {
             device.limits().max_texture_dimension_2d,
         )?;
         let stages = wgpu::ShaderStages::FRAGMENT;
-        let types = [binding::UNIFORM, binding::STORAGE, binding::DEPTH_LAYERS, binding::ID_LAYERS];
+        let types = [binding::UNIFORM, binding::STORAGE, binding::ID_LAYERS];
         let own = HeldGroup::new(device, "shadow maps", stages, &types);
         let scene = SceneBindings::new(device, stages);
         let receivers = Receivers::new(device);
@@ -133,8 +133,8 @@ impl ShadowMapOnGpu {
         let maps = self.maps.get(device, bytemuck::bytes_of(&maps));
         let views = self.views.get(device, bytemuck::cast_slice(&uniforms));
         self.prepared = None;
-        if let (Some(depth), Some(ids)) = (self.layers.bound_depth(), self.layers.bound_ids()) {
-            let own = self.own.get(device, &[maps.into(), views.into(), depth, ids]);
+        if let Some(ids) = self.layers.bound_ids() {
+            let own = self.own.get(device, &[maps.into(), views.into(), ids]);
             self.prepared = Some(Prepared { own, scene: self.scene.groups(device, &query.scene) });
         }
         self.receivers.prepare(device, query);
