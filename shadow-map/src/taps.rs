@@ -140,7 +140,7 @@ impl<'m> Taps<'m> {
             let index = row as usize * size as usize + column as usize;
             let depth = map.map.depth[index];
             let rises = depth > 0.0 && self.plane.rise(column as f32, row as f32, depth) > 0.0;
-            rises.then(|| Stored { view: self.view, index, depth })
+            rises.then_some(Stored { view: self.view, index, depth })
         } else {
             self.risen_beside(column, row)
         }
@@ -174,7 +174,7 @@ impl<'m> Taps<'m> {
         let plane =
             if view == self.view { self.plane } else { TexelPlane::new(&map.view, size, &self.receiver) };
         let rises = depth > 0.0 && plane.rise(column as f32, row as f32, depth) > 0.0;
-        rises.then(|| Stored { view, index, depth })
+        rises.then_some(Stored { view, index, depth })
     }
 
     /// The stored point, at its texel's centre, in world space.
