@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod alias_free;
 pub mod cpu;
 pub mod depth_pyramid;
 pub mod filter_maps;

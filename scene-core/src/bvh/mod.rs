@@ -15,6 +15,7 @@
 //! Coordinates of any size work; where those relative to a ray's origin exceed 2³⁸ a slow path is taken, and
 //! what exceeds the range of f32 blocks nothing.
 
+mod blocks;
 mod cover;
 mod exact;
 mod filter;
@@ -36,6 +37,7 @@ use exact::Crossing;
 use tree::{Link, Tree, WIDTH};
 use walk::Cutout;
 
+pub use blocks::{blocks, blocks_cut_out};
 pub use cover::{Cover, LastCover, OUTLINE};
 pub use offset::shadow_origin;
 pub use region::HalfSpace;
@@ -78,9 +80,7 @@ impl Cutout for &Masks {
         let (lanes, first) = self.blocks[block];
         let before = (lanes & ((1 << lane) - 1)).count_ones();
         let masked = &self.triangles[(first + before) as usize];
-        let [v, w] = crossing.weights;
-        let [a, b, c] = masked.uvs.map(|uv| uv.as_dvec2());
-        masked.mask.is_solid((a * (1.0 - v - w) + b * v + c * w).as_vec2())
+        blocks::is_solid(&masked.mask, masked.uvs, crossing)
     }
 }
 
