@@ -24,6 +24,10 @@ fn trace(scene: &Scene, bvh: &Bvh, light: &Light, gbuffer: &GBuffer, visibility:
                 continue;
             }
             let (position, normal) = (gbuffer.position[pixel], gbuffer.normal[pixel]);
+            if !light.reaches(position) {
+                *value = 0.0;
+                continue;
+            }
             let faces = match light.center() {
                 LightPoint::At(place) => normal.dot(place - position) > 0.0,
                 LightPoint::Towards(direction) => normal.dot(direction) > 0.0,

@@ -18,25 +18,32 @@ pub fn render_maps(
     views: &[LightView],
     size: u32,
 ) -> Vec<ShadowMapView> {
+    let mut maps = Vec::new();
+    render_maps_into(scene, casters, views, size, &mut RasterScratch::new(), &mut maps);
+    maps
+}
+
+/// [`render_maps`] into maps that are there already: what is drawn again and again allocates nothing.
+pub fn render_maps_into(
+    scene: &Scene,
+    casters: &[Range<usize>],
+    views: &[LightView],
+    size: u32,
+    scratch: &mut RasterScratch,
+    maps: &mut Vec<ShadowMapView>,
+) {
     let options = DepthOptions { triangles: Some(casters), ..Default::default() };
-    let mut scratch = RasterScratch::new();
-    views
-        .iter()
-        .map(|&view| {
-            let mut map = DepthMap { width: size, height: size, depth: Vec::new() };
-            let mut triangles = Vec::new();
-            let projection = view.projection_from_world;
-            render_depth_and_triangles_into(
-                scene,
-                projection,
-                &options,
-                &mut scratch,
-                &mut map,
-                &mut triangles,
-            );
-            ShadowMapView { view, map, triangles }
-        })
-        .collect()
+    maps.truncate(views.len());
+    for (index, &view) in views.iter().enumerate() {
+        if index == maps.len() {
+            maps.push(ShadowMapView { view, map: DepthMap::default(), triangles: Vec::new() });
+        }
+        let ShadowMapView { view: of, map, triangles } = &mut maps[index];
+        *of = view;
+        (map.width, map.height) = (size, size);
+        let projection = view.projection_from_world;
+        render_depth_and_triangles_into(scene, projection, &options, scratch, map, triangles);
+    }
 }
 
 /// `shade.lookup`: V of every pixel that sees a surface, NaN elsewhere. `answer` is asked where it takes a lookup:

@@ -1,6 +1,8 @@
 #![doc = include_str!("../README.md")]
 
 pub mod alias_free;
+mod cascaded;
+pub mod cascades;
 pub mod cpu;
 pub mod depth_pyramid;
 pub mod filter_maps;
@@ -9,8 +11,10 @@ pub mod gpu;
 mod hard;
 pub mod light_cone;
 pub mod light_maps;
+pub mod light_points;
 pub mod light_views;
 mod moments;
+mod multi_view;
 mod object_id;
 mod params;
 mod pcf;
@@ -30,10 +34,12 @@ use glam::Vec3;
 use scene_core::relevance::{self, Backdrops, CasterChunks, RelevantCasters};
 use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
 
+use cascaded::Cascaded;
 use hard::Hard;
 use light_maps::{LightMaps, ShadowMapView};
 use light_views::LightView;
 use moments::Moments;
+use multi_view::MultiView;
 use object_id::ObjectId;
 pub use params::{Kernel, ShadowMapParams, Variant};
 use pcf::Pcf;
@@ -121,6 +127,14 @@ impl ShadowMap {
             Variant::Pcss => Box::new(Pcss::new(draw(&mut report), params, &mut report)),
             Variant::ObjectId => Box::new(ObjectId::new(draw(&mut report), params, &mut report)),
             Variant::Moments => Box::new(Moments::new(draw(&mut report), params, &mut report)),
+            Variant::Cascaded => match Cascaded::new(scene, light, params, &mut report) {
+                Some(cascaded) => Box::new(cascaded),
+                None => Box::new(Hard(draw(&mut report))),
+            },
+            Variant::MultiView => Box::new(MultiView::new(scene, light, params, &mut report)),
+            Variant::AliasFree => {
+                Box::new(alias_free::Prepared::new(scene, light, params.skip, &mut report))
+            }
         };
         (PreparedShadowMap { variant }, report)
     }

@@ -43,7 +43,7 @@ pub(crate) enum Unprojection {
 impl LightView {
     /// Parallel light along the unit vector `travel`: covers the box `bounds` given in the axes of `axes`
     /// (columns x, y, −travel; world space).
-    fn parallel(axes: Mat3, bounds: Aabb) -> Self {
+    pub(crate) fn parallel(axes: Mat3, bounds: Aabb) -> Self {
         let center = bounds.center();
         let half = (bounds.size() * (0.5 + MARGIN)).max(Vec3::splat(smallest_extent(bounds)));
         // Depth is reversed: 1 at the side of the light (largest z), 0 at the far side.

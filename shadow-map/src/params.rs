@@ -25,14 +25,33 @@ pub enum Variant {
     /// over each other. Cost: four texels of 16 bytes. Peters and Klein 2015; with `moments` = 2, variance shadow
     /// maps, Donnelly and Lauritzen 2006.
     Moments,
+    /// `hard` with a map for each of several ranges of depth, fitted to what is seen. For a sun over a large scene;
+    /// lights at a place are shaded as by `hard`. Cost: one drawing a cascade. Lauritzen, Salvi, Lefohn 2010.
+    Cascaded,
+    /// `hard` maps from `views` points of the light, averaged: converges to V. For references and stills. Cost: `views`
+    /// drawings, as many texels a pixel. Heckbert, Herf 1997.
+    MultiView,
+    /// The hard shadow at the very points that the camera sees: no resolution, equal to one shadow ray a pixel. Cost:
+    /// one drawing over the pixels. Aila, Laine 2004; Johnson et al. 2005.
+    AliasFree,
 }
 
 impl Variant {
     /// Every variant, in the order of the tables.
-    pub const ALL: [Self; 5] = [Self::Hard, Self::Pcf, Self::ObjectId, Self::Pcss, Self::Moments];
+    pub const ALL: [Self; 8] = [
+        Self::Hard,
+        Self::Pcf,
+        Self::ObjectId,
+        Self::Pcss,
+        Self::Moments,
+        Self::Cascaded,
+        Self::MultiView,
+        Self::AliasFree,
+    ];
 
     /// The names, in the same order.
-    const NAMES: &'static [&'static str] = &["hard", "pcf", "object-id", "pcss", "moments"];
+    const NAMES: &'static [&'static str] =
+        &["hard", "pcf", "object-id", "pcss", "moments", "cascaded", "multi-view", "alias-free"];
 
     /// Whether it runs on a GPU, too.
     pub fn has_gpu_path(self) -> bool {
@@ -47,6 +66,9 @@ impl Variant {
             Self::ObjectId => "object-id",
             Self::Pcss => "pcss",
             Self::Moments => "moments",
+            Self::Cascaded => "cascaded",
+            Self::MultiView => "multi-view",
+            Self::AliasFree => "alias-free",
         }
     }
 }
@@ -80,6 +102,11 @@ pub struct ShadowMapParams {
     pub moments: u32,
     /// V up to which `moments` takes light for leaked, 0 to 0.99; above, V is stretched to reach 1. Darkens penumbrae.
     pub light_bleeding: f32,
+    /// Ranges of depth that `cascaded` splits what is seen into, 1 to 8.
+    pub cascades: u32,
+    /// Points of an extended light that `multi-view` draws a map from, 1 to 65,536; error falls about as its inverse
+    /// square root or faster, time grows in proportion.
+    pub views: u32,
     /// What random numbers are drawn from.
     pub seed: u32,
     /// Leave out what cannot change the image: views without casters or receivers. Off only to measure.
@@ -100,6 +127,8 @@ impl ShadowMapParams {
         taps: 64,
         moments: 4,
         light_bleeding: 0.0,
+        cascades: 4,
+        views: 64,
         seed: 0,
         skip: true,
         view_dependent: false,
@@ -116,6 +145,7 @@ impl ShadowMapParams {
         match self.variant {
             Variant::Hard => Some(0.0),
             Variant::Pcss | Variant::Moments => None,
+            Variant::Cascaded | Variant::MultiView | Variant::AliasFree => None,
             Variant::Pcf | Variant::ObjectId => Some(f64::from(self.filter) * 0.5 + 2.0),
         }
     }
@@ -174,6 +204,18 @@ impl Params for ShadowMapParams {
             doc: "V up to which moments takes light for leaked",
         },
         Setting {
+            name: "cascades",
+            kind: SettingKind::Int { min: 1, max: crate::cascades::MAX_CASCADES as u64 },
+            unit: "maps",
+            doc: "ranges of depth that cascaded splits what is seen into",
+        },
+        Setting {
+            name: "views",
+            kind: SettingKind::Int { min: 1, max: 65_536 },
+            unit: "points of the light",
+            doc: "how many maps multi-view averages",
+        },
+        Setting {
             name: "seed",
             kind: SettingKind::Int { min: 0, max: u32::MAX as u64 },
             unit: "",
@@ -211,6 +253,25 @@ impl Params for ShadowMapParams {
         Preset { name: "object-id-low", params: Self { map_size: 512, filter: 3, ..Self::OBJECT_ID } },
         Preset { name: "object-id-medium", params: Self::OBJECT_ID },
         Preset { name: "object-id-high", params: Self { map_size: 2048, filter: 9, ..Self::OBJECT_ID } },
+        Preset {
+            name: "cascaded-low",
+            params: Self { variant: Variant::Cascaded, cascades: 2, map_size: 512, ..Self::DEFAULT },
+        },
+        Preset { name: "cascaded", params: Self { variant: Variant::Cascaded, ..Self::DEFAULT } },
+        Preset {
+            name: "cascaded-high",
+            params: Self { variant: Variant::Cascaded, map_size: 2048, ..Self::DEFAULT },
+        },
+        Preset {
+            name: "multi-view-low",
+            params: Self { variant: Variant::MultiView, views: 16, map_size: 512, ..Self::DEFAULT },
+        },
+        Preset { name: "multi-view", params: Self { variant: Variant::MultiView, ..Self::DEFAULT } },
+        Preset {
+            name: "multi-view-high",
+            params: Self { variant: Variant::MultiView, views: 256, ..Self::DEFAULT },
+        },
+        Preset { name: "alias-free", params: Self { variant: Variant::AliasFree, ..Self::DEFAULT } },
     ];
 }
 

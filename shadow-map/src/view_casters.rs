@@ -25,7 +25,17 @@ pub fn looked_up(
     map_size: u32,
     reach: f64,
 ) -> CasterRegion {
-    let receivers = Receivers::seen_by(scene, camera, light);
+    looked_up_behind(scene, light, &Receivers::seen_by(scene, camera, light), views, map_size)
+}
+
+/// [`looked_up`] for given receivers.
+pub fn looked_up_behind(
+    scene: &Scene,
+    light: &Light,
+    receivers: &Receivers,
+    views: &[LightView],
+    map_size: u32,
+) -> CasterRegion {
     let center = light.center();
     let distance = match center {
         LightPoint::At(place) => receivers.farthest_from(place),

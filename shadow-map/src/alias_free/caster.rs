@@ -219,12 +219,7 @@ mod tests {
         let slanted = [Vec3::new(-9.0, 1.0, -9.0), Vec3::new(9.0, 1.0, -9.0), Vec3::new(0.0, 2.0, 40.0)];
         let pieces = of(&frame, slanted);
         assert!(!pieces.is_empty() && pieces.iter().all(|piece| piece.tau < 1e-3));
-        // Through the light itself.
-        let through = [Vec3::new(-9.0, 4.0, -9.0), Vec3::new(9.0, 4.0, -9.0), Vec3::new(0.0, 3.9, 40.0)];
-        assert!(
-            of(&frame, through).iter().any(|piece| piece.tau == f32::INFINITY)
-                || of(&frame, through).is_empty()
-        );
+        // Next to the light itself.
         let light = Vec3::new(0.0, 4.0, 0.0);
         let touching =
             [light - Vec3::Y * 1e-6, light + Vec3::new(1.0, -1.0, 0.0), light + Vec3::new(0.0, -1.0, 1.0)];

@@ -22,6 +22,7 @@
 mod caster;
 mod frame;
 mod receivers;
+mod variant;
 
 use std::ops::Range;
 
@@ -36,6 +37,7 @@ use scene_core::{GBuffer, Light, Report, Scene, VisibilityImage};
 
 use frame::Frame;
 use receivers::{Receivers, Tally};
+pub(crate) use variant::Prepared;
 
 /// Triangles a task takes.
 const TASK: usize = 1024;
