@@ -105,7 +105,7 @@ impl<'a> Cascaded<'a> {
             let ranges: Vec<Range<usize>> = if self.params.skip && !views.is_empty() {
                 report.time("shade.relevance", |report| {
                     let receivers = Receivers::within(self.scene, &boxes(cascade), &self.light);
-                    let region = looked_up_behind(self.scene, &self.light, &receivers, &views, size);
+                    let region = looked_up_behind(self.scene, &self.light, &receivers, &views, size, 0.0);
                     let kept = relevance::relevant_casters(self.scene, &region, &self.chunks, |id| {
                         let object = &objects[id as usize];
                         !self.casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))

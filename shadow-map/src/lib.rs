@@ -132,9 +132,7 @@ impl ShadowMap {
                 None => Box::new(Hard(draw(&mut report))),
             },
             Variant::MultiView => Box::new(MultiView::new(scene, light, params, &mut report)),
-            Variant::AliasFree => {
-                Box::new(alias_free::Prepared::new(scene, light, params.skip, &mut report))
-            }
+            Variant::AliasFree => Box::new(alias_free::Prepared::new(scene, light, params.skip, &mut report)),
         };
         (PreparedShadowMap { variant }, report)
     }

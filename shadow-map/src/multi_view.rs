@@ -96,7 +96,7 @@ impl<'a> MultiView<'a> {
                 report.time("shade.relevance", |report| {
                     let receivers = Receivers::within(self.scene, boxes, &light);
                     let size = self.params.map_size;
-                    let region = looked_up_behind(self.scene, &light, &receivers, &views.views, size);
+                    let region = looked_up_behind(self.scene, &light, &receivers, &views.views, size, 0.0);
                     let objects = self.scene.objects();
                     let kept = relevance::relevant_casters(self.scene, &region, &self.chunks, |id| {
                         !casters.backdrops.iter().any(|b| std::ptr::eq(*b, &objects[id as usize]))

@@ -29,12 +29,17 @@ impl ShadowTechnique for ShadowMap {
         let support = |capability| match capability {
             Capability::DirectionalLight | Capability::PointLight | Capability::SpotLight => match variant {
                 Variant::Pcf | Variant::ObjectId | Variant::Moments => BLUR,
-                Variant::Hard | Variant::Pcss => Support::Exact,
+                Variant::Hard
+                | Variant::Pcss
+                | Variant::Cascaded
+                | Variant::MultiView
+                | Variant::AliasFree => Support::Exact,
             },
             Capability::Sun | Capability::SphereLight | Capability::RectLight | Capability::DiskLight => {
                 match variant {
                     Variant::Pcss => MEAN,
-                    Variant::Hard => CENTRE,
+                    Variant::MultiView => Support::Exact,
+                    Variant::Hard | Variant::Cascaded | Variant::AliasFree => CENTRE,
                     Variant::Pcf | Variant::ObjectId | Variant::Moments => BLUR,
                 }
             }

@@ -25,7 +25,7 @@ pub fn looked_up(
     map_size: u32,
     reach: f64,
 ) -> CasterRegion {
-    looked_up_behind(scene, light, &Receivers::seen_by(scene, camera, light), views, map_size)
+    looked_up_behind(scene, light, &Receivers::seen_by(scene, camera, light), views, map_size, reach)
 }
 
 /// [`looked_up`] for given receivers.
@@ -35,6 +35,7 @@ pub fn looked_up_behind(
     receivers: &Receivers,
     views: &[LightView],
     map_size: u32,
+    reach: f64,
 ) -> CasterRegion {
     let center = light.center();
     let distance = match center {
