@@ -25,7 +25,7 @@ fn camera(eye: Vec3, target: Vec3, scale: f32) -> Camera {
 }
 
 fn settings() -> Vec<ShadowMapParams> {
-    let of = |variant| ShadowMapParams { variant, taps: 16, ..Default::default() };
+    let of = |variant| ShadowMapParams { variant, taps: 16, views: 4, ..Default::default() };
     let mut all: Vec<_> = Variant::ALL.map(of).to_vec();
     all.push(ShadowMapParams { kernel: Kernel::PoissonDisk, filter: 9, ..of(Variant::Pcf) });
     all.push(ShadowMapParams { moments: 2, ..of(Variant::Moments) });
