@@ -44,14 +44,15 @@ fn errors_of_multi_view(spec: &str) -> Vec<f64> {
     [(4, 64), (32, 256), (256, 512)].map(error).to_vec()
 }
 
-/// With all points and half the texels that the promise of 0.01 is made for (the example has the full sizes).
+/// At worst the error falls as the texel: with all points and half the texels a side of what 0.01 is promised for, twice
+/// that (the example has the full sizes).
 #[test]
 fn multi_view_converges_to_ground_truth() {
     for spec in ["quads", "ball", "log-cabin"] {
         let errors = errors_of_multi_view(spec);
         println!("{spec}: {errors:?}");
         assert!(errors[1] < 0.6 * errors[0] && errors[2] < 0.6 * errors[1], "{spec}: {errors:?}");
-        assert!(errors[2] < 0.015, "{spec}: {errors:?}");
+        assert!(errors[2] < 0.02, "{spec}: {errors:?}");
     }
 }
 
