@@ -3,6 +3,8 @@
 //! `prepare.views` is the CPU's own code. `prepare.maps` draws the casters, the nearest triangle a texel, into a layer
 //! a view. `shade.lookup` asks the questions of [`receiver_plane`](crate::receiver_plane) in one full-screen pass.
 //!
+//! `view_dependent` is not asked here: all casters are drawn, which costs time and changes no pixel.
+//!
 //! V differs from the CPU's only where the hardware's rasteriser gives a texel on a caster's outline to the other side
 //! of it, or a receiver on the border of two texels to the other one.
 
@@ -91,7 +93,7 @@ impl ShadowMapOnGpu {
         })
     }
 
-    /// Records the drawing of the maps of the query's light. They hold for any camera.
+    /// Records the drawing of the maps of the query's light. They hold for any camera, `view_dependent` or not.
     ///
     /// Without [`GpuScene::geometry`](scene_core::gpu::GpuScene::geometry) the views are fitted to the bounds of
     /// objects, which takes more texels than the vertices would.
