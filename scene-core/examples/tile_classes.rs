@@ -65,7 +65,7 @@ fn load(scene: &str) -> Result<SceneSetup, Box<dyn Error>> {
 
 /// The least of five times, in milliseconds, and the result.
 fn fastest<T>(work: impl Fn() -> T) -> (f64, T) {
-    let mut run = || {
+    let run = || {
         let start = Instant::now();
         let result = work();
         (start.elapsed().as_secs_f64() * 1e3, result)
