@@ -64,7 +64,8 @@ struct Job {
 
 /// Builds the command, then makes or checks the figures.
 pub(crate) fn run(check: bool) -> Result<(), CheckError> {
-    cargo(&["build", "--profile", "ci", "--package", "gnomon"], &[])?;
+    // The whole workspace, as the tests build it: alone the command would get dependencies with other features, anew.
+    cargo(&["build", "--profile", "ci", "--workspace", "--bins"], &[])?;
     run_built(check)
 }
 

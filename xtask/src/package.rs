@@ -32,13 +32,8 @@ pub(crate) fn run() -> Result<(), CheckError> {
     cargo(&arguments, &[])?;
     let folder = target().join("package").join("unpacked");
     unpack(&packages, &folder)?;
-    let build = |more: &[&str]| {
-        let place = target().display().to_string();
-        let arguments = ["check", "--quiet", "--workspace", "--target-dir", &place];
-        cargo_at(&folder, &[&arguments[..], more].concat(), &[])
-    };
-    build(&[])?;
-    build(&["--no-default-features"])
+    let place = target().display().to_string();
+    cargo_at(&folder, &["check", "--quiet", "--workspace", "--target-dir", &place], &[])
 }
 
 /// Unpacks the packages into a workspace.

@@ -32,18 +32,11 @@ pub(crate) fn run(accept: bool) -> Result<(), CheckError> {
     if again.found.is_empty() { again.tests } else { Err(again.refusal()) }
 }
 
-/// Tests that ask for snapshots: package and test target of each.
-#[derive(Debug, Default, PartialEq, Eq)]
-struct Tests {
-    packages: BTreeSet<String>,
-    targets: BTreeSet<String>,
-}
-
-/// Finds every test target that uses `insta`, or compares golden pictures.
-fn tests(root: &Path) -> Result<Tests, CheckError> {
+/// Names of the test targets that use `insta`, or compare golden pictures.
+fn tests(root: &Path) -> Result<BTreeSet<String>, CheckError> {
     let mut files = Vec::new();
     crate::tidy::collect(root, &mut files)?;
-    let mut tests = Tests::default();
+    let mut tests = BTreeSet::new();
     for file in files {
         let name = file.strip_prefix(root).unwrap_or(&file);
         let parts: Vec<_> = name.iter().map(|part| part.to_string_lossy()).collect();
@@ -52,8 +45,7 @@ fn tests(root: &Path) -> Result<Tests, CheckError> {
             fs::read_to_string(&file).map_err(|source| CheckError::Read { path: file.clone(), source })?;
         let asks = ["insta::assert", "tests/golden/pictures"].iter().any(|word| text.contains(word));
         if folder == "tests" && member != "xtask" && asks {
-            tests.packages.insert(if member == "cli" { "gnomon".into() } else { format!("gnomon-{member}") });
-            tests.targets.insert(target.trim_end_matches(".rs").to_owned());
+            tests.insert(target.trim_end_matches(".rs").to_owned());
         }
     }
     Ok(tests)
@@ -76,11 +68,11 @@ impl Outcome {
     }
 }
 
-fn run_tests(tests: &Tests, accept: bool) -> Result<Outcome, CheckError> {
+fn run_tests(tests: &BTreeSet<String>, accept: bool) -> Result<Outcome, CheckError> {
     let report = Report::new()?;
-    let mut arguments = vec!["test", "--profile", "ci", "--no-fail-fast"];
-    arguments.extend(tests.packages.iter().flat_map(|package| ["--package", package]));
-    arguments.extend(tests.targets.iter().flat_map(|target| ["--test", target]));
+    // The whole workspace, as CI builds it: alone the packages would get dependencies with other features, anew.
+    let mut arguments = vec!["test", "--profile", "ci", "--no-fail-fast", "--workspace"];
+    arguments.extend(tests.iter().flat_map(|target| ["--test", target]));
     let gpu = vulkan::environment()?;
     let environment = report.environment().into_iter().chain(gpu.iter().map(|(n, v)| (*n, v.clone())));
     let environment: Vec<_> = environment.collect();
@@ -163,7 +155,6 @@ mod tests {
             fs::write(tree.path().join(name), text).unwrap();
         }
         let found = tests(tree.path()).unwrap();
-        assert_eq!(found.packages, BTreeSet::from(["gnomon".into(), "gnomon-psm".into()]));
-        assert_eq!(found.targets, BTreeSet::from(["cli".into(), "errors".into(), "golden".into()]));
+        assert_eq!(found, BTreeSet::from(["cli".into(), "errors".into(), "golden".into()]));
     }
 }

@@ -70,12 +70,12 @@ pub(crate) struct Case {
 impl Case {
     /// The trial's name.
     pub(crate) fn name(&self) -> String {
-        format!("{}::{}::{}", self.technique, self.variant, self.backend)
+        format!("{}::{}::{}::{}", self.technique, self.variant, self.scene, self.backend)
     }
 
     /// The golden picture's file, the same for every backend.
     pub(crate) fn picture(&self, folder: &Path) -> PathBuf {
-        folder.join(&self.technique).join(format!("{}.png", self.variant))
+        folder.join(&self.technique).join(format!("{}-{}.png", self.variant, self.scene))
     }
 }
 
@@ -100,26 +100,32 @@ pub(crate) fn cases_of(list: &Value) -> Vec<Case> {
         let has_setting = items(&technique["settings"]).iter().any(|setting| setting["name"] == "variant");
         for variant in items(&technique["variants"]) {
             let takes = &variant["takes"];
-            let (scene, light) = scene(takes)
-                .unwrap_or_else(|| panic!("{name} {variant}: takes the light of no scene in the table"));
+            let scenes = scenes(takes);
+            assert!(!scenes.is_empty(), "{name} {variant}: takes the light of no scene in the table");
             let on_gpu = (takes["gpu"]["support"] != "unsupported").then_some("gpu");
-            for backend in std::iter::once("cpu").chain(on_gpu) {
-                let (technique, variant) = (name.clone(), text(&variant["name"]));
-                cases.push(Case { technique, variant, has_setting, backend, scene, light });
+            for (scene, light) in scenes {
+                for backend in std::iter::once("cpu").chain(on_gpu) {
+                    let (technique, variant) = (name.clone(), text(&variant["name"]));
+                    cases.push(Case { technique, variant, has_setting, backend, scene, light });
+                }
             }
         }
     }
     cases
 }
 
-/// The first scene whose light is taken exactly, else the first whose light is taken at all.
-fn scene(takes: &Value) -> Option<(&'static str, SceneLight)> {
-    let with = |supports: &[&str]| {
+/// The scenes of a variant: one with an extended light, because most variants answer to its extent, and one without,
+/// each where the variant takes it. Of the extended lights it is the first that is taken exactly, else the first that is
+/// taken at all.
+fn scenes(takes: &Value) -> Vec<(&'static str, SceneLight)> {
+    let with = |is_extended: bool, supports: &[&str]| {
         SCENES.into_iter().find(|(_, light)| {
-            takes[light.capability()]["support"].as_str().is_some_and(|support| supports.contains(&support))
+            let support = takes[light.capability()]["support"].as_str();
+            light.is_extended() == is_extended && support.is_some_and(|support| supports.contains(&support))
         })
     };
-    with(&["exact"]).or_else(|| with(&["approximate"]))
+    let extended = with(true, &["exact"]).or_else(|| with(true, &["approximate"]));
+    extended.into_iter().chain(with(false, &["exact", "approximate"])).collect()
 }
 
 /// Pictures below `folder` that belong to no case.

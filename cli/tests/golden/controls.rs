@@ -13,6 +13,10 @@ pub(crate) fn trials() -> Vec<Trial> {
         Trial::test("controls::ties_of_rounding_pass", ties_of_rounding_pass),
         Trial::test("controls::planted_differences_fail", planted_differences_fail),
         Trial::test("controls::every_variant_is_found", every_variant_is_found),
+        Trial::test(
+            "controls::lights_with_and_without_extent_are_shown",
+            lights_with_and_without_extent_are_shown,
+        ),
         Trial::test("controls::pictures_of_nothing_are_found", pictures_of_nothing_are_found),
     ]
 }
@@ -97,18 +101,33 @@ fn listed(variants: &[(&str, &str)]) -> Value {
 
 fn every_variant_is_found() -> Result<(), Failed> {
     let names = |variants| -> Vec<String> { cases_of(&listed(variants)).iter().map(|c| c.name()).collect() };
-    ensure(names(&[("a", "unsupported")]) == ["t::a::cpu"], "one variant")?;
+    ensure(names(&[("a", "unsupported")]) == ["t::a::ball::cpu"], "one variant")?;
     let found = names(&[("a", "exact"), ("b", "unsupported")]);
-    ensure(found == ["t::a::cpu", "t::a::gpu", "t::b::cpu"], &format!("{found:?}"))
+    ensure(found == ["t::a::ball::cpu", "t::a::ball::gpu", "t::b::ball::cpu"], &format!("{found:?}"))
+}
+
+fn lights_with_and_without_extent_are_shown() -> Result<(), Failed> {
+    let scenes = |takes: Value| -> Vec<&str> {
+        let variants = [json!({ "name": "a", "takes": takes })];
+        let technique = json!({ "name": "t", "settings": [], "variants": variants });
+        cases_of(&json!({ "techniques": [technique] })).iter().map(|case| case.scene).collect()
+    };
+    let support = |support: &str| json!({ "support": support });
+    let gpu = || support("unsupported");
+    let (exact, approximate) = (|| support("exact"), || support("approximate"));
+    let both = json!({ "rect_light": approximate(), "sun": exact(), "spot_light": exact(), "gpu": gpu() });
+    ensure(scenes(both) == ["pool", "chess"], "exact before approximate, extended before point")?;
+    ensure(scenes(json!({ "spot_light": exact(), "gpu": gpu() })) == ["chess"], "a hard technique")?;
+    ensure(scenes(json!({ "sphere_light": approximate(), "gpu": gpu() })) == ["knot"], "a soft technique")
 }
 
 fn pictures_of_nothing_are_found() -> Result<(), Failed> {
     let folder = tempfile::tempdir()?;
     std::fs::create_dir(folder.path().join("t"))?;
-    for name in ["t/a.png", "t/gone.png", "stray.png"] {
+    for name in ["t/a-ball.png", "t/gone-ball.png", "stray.png"] {
         std::fs::write(folder.path().join(name), "")?;
     }
     let left_over = left_over(&cases_of(&listed(&[("a", "exact")])), folder.path());
-    let expected = ["stray.png", "t/gone.png"].map(|name| folder.path().join(name));
+    let expected = ["stray.png", "t/gone-ball.png"].map(|name| folder.path().join(name));
     ensure(left_over == expected, &format!("{left_over:?}"))
 }

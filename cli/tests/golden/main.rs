@@ -8,7 +8,7 @@
 //! | [`failure`] | what is left behind of a comparison that failed |
 //! | [`controls`] | proofs that the comparator can fail |
 //!
-//! Pictures lie in `tests/golden/pictures/TECHNIQUE/VARIANT.png`; there is one for all backends, made on the CPU. No test
+//! Pictures lie in `tests/golden/pictures/TECHNIQUE/VARIANT-SCENE.png`; each is for all backends, made on the CPU. No test
 //! writes there: `cargo xtask snapshots --accept` does.
 
 mod catalogue;
