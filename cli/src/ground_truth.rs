@@ -40,12 +40,9 @@ pub(crate) fn trace(
     seed: u64,
     console: &Console,
 ) -> Result<(GroundTruth, RunReport), CliError> {
-    let (variant, settings) = if args.exact {
-        ("exact".to_owned(), json!({ "exact": true }))
-    } else {
-        let variant = count_of(args.samples as usize, "sample") + " a pixel";
-        (variant, json!({ "samples": args.samples, "seed": seed }))
-    };
+    let a_pixel = count_of(args.samples as usize, "sample") + " a pixel";
+    let mut settings = json!({ "samples": args.samples, "seed": seed });
+    let variant = if args.exact { "exact".to_owned() } else { a_pixel.clone() };
     let (scene, light) = (&view.setup.scene, view.light());
     let mut report = Report::default();
     let start = Instant::now();
@@ -62,16 +59,28 @@ pub(crate) fn trace(
     let prepare_ms = milliseconds_since(start);
     let start = Instant::now();
     let traced = report.time("shade.rays", |_| -> Result<Reference, CliError> {
-        if args.exact {
-            return Ok(exact_reference(scene, &bvh, light, gbuffer, &progress)?);
-        }
         let sampling = ReferenceSettings { samples: args.samples, seed, skip: true };
+        if args.exact {
+            return Ok(exact_reference(scene, &bvh, light, gbuffer, &sampling, &progress)?);
+        }
         Ok(reference(scene, &bvh, light, gbuffer, &sampling, &progress)?)
     })?;
     let shade_ms = milliseconds_since(start);
-    if !args.exact {
-        report.skip("wholly lit pixels", traced.work.proved_lit);
-        report.skip("wholly dark pixels", traced.work.proved_dark);
+    report.skip("wholly lit pixels", traced.work.proved_lit);
+    report.skip("wholly dark pixels", traced.work.proved_dark);
+    if args.exact {
+        // Lights without extent are decided by one ray a pixel.
+        let hang_on_masks = if light.is_extended() { traced.work.sampled } else { 0 };
+        settings = json!({ "exact": true });
+        if hang_on_masks > 0 {
+            settings = json!({
+                "exact": true, "sampled_pixels": hang_on_masks, "samples": args.samples, "seed": seed,
+            });
+            console.note(&format!(
+                "note: cut-out masks leave {} to sampling, {a_pixel}; all others are exact",
+                count_of(hang_on_masks as usize, "pixel"),
+            ));
+        }
     }
     let truth = GroundTruth {
         visibility: traced.visibility,

@@ -46,7 +46,6 @@ fn usage() {
         (with(&["--backend", "abacus"]), "abacus"),
         (vec!["render", "quads", "--technique", "nonesuch", "--out", "out"], "no technique 'nonesuch'"),
         (vec!["reference", "quads", "--samples", "0", "--out", "out"], "--samples"),
-        (vec!["reference", "quads", "--exact", "--samples", "4", "--out", "out"], "--exact"),
         (vec!["reference", "knot", "--exact", "--size", "8x8", "--out", "out"], "not this sphere light"),
         (vec!["compare", "quads", "--techniques", "nonesuch"], "no technique 'nonesuch'"),
         (vec!["compare", "quads", "--techniques", "shadow-map@nonesuch"], "no preset 'nonesuch'"),

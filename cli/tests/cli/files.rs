@@ -139,6 +139,23 @@ fn exact_truth_is_what_sampled_truth_tends_to() {
 }
 
 #[test]
+fn exact_truth_says_what_masks_leave_to_samples() {
+    let bench = Workbench::new();
+    let command = ["reference", "fence", "--size", "24x24", "--exact", "--samples", "16", "--out", "exact"];
+    let out = bench.done(&command);
+    let settings = &bench.json("exact/report.json")["settings"];
+    let sampled = settings["sampled_pixels"].as_u64().unwrap();
+    assert_eq!(settings["samples"], 16);
+    assert!(
+        out.stderr.contains(&format!("cut-out masks leave {sampled} pixels to sampling, 16 samples")),
+        "{}",
+        out.stderr
+    );
+    let (_, error) = bench.npy::<f32>("exact/std_error.npy");
+    assert_eq!(error.iter().filter(|&&e| e > 0.0).count() as u64, sampled);
+}
+
+#[test]
 fn truth_depends_on_the_seed_and_not_on_threads() {
     let bench = Workbench::new();
     let values = |more: &[&str]| {

@@ -30,13 +30,13 @@ impl HalfSpace {
     }
 }
 
-/// Entries of a walk; deeper trees than this are not searched. One of a million triangles uses about 60.
+/// Entries of a walk that are kept on the stack. A tree of a million triangles uses about 60; a deeper one takes memory.
 const STACK: usize = 256;
 
 impl Bvh {
     /// Calls `visit` with the triangles (as indices into [`Scene::triangles`](crate::Scene::triangles)) that may reach
     /// into the region that the half-spaces have in common: all but those that lie wholly outside one of them, as in
-    /// [`Bvh::misses`]. Breaks if `visit` does, and if the tree is too deep to be searched.
+    /// [`Bvh::misses`], each once. Breaks if `visit` does.
     pub fn visit_region(
         &self,
         region: &[HalfSpace],
@@ -44,10 +44,13 @@ impl Bvh {
     ) -> ControlFlow<()> {
         let Tree { root, nodes, blocks, triangles, stack, .. } = &self.tree;
         let Some(root) = *root else { return ControlFlow::Continue(()) };
-        if *stack > STACK {
-            return ControlFlow::Break(());
-        }
-        let mut links = [Link::NONE; STACK];
+        let (mut shallow, mut deep) = ([Link::NONE; STACK], Vec::new());
+        let links = if *stack > STACK {
+            deep.resize(*stack, Link::NONE);
+            &mut deep[..]
+        } else {
+            &mut shallow[..]
+        };
         links[0] = root;
         let mut height = 1;
         while height > 0 {

@@ -1,9 +1,10 @@
 //! What ground truth asks of a spatial index. The [`Bvh`] answers; in tests an analytic shape can.
 
+use std::ops::ControlFlow;
+
 use glam::Vec3;
 
-use crate::bvh::Bvh;
-use crate::geometry::Aabb;
+use crate::bvh::{Bvh, HalfSpace};
 use crate::light::LightPoint;
 
 /// Something that blocks light.
@@ -18,12 +19,11 @@ pub trait Occlusion: Sync {
     }
 }
 
-/// Something that finds the casters near a region.
+/// Something that finds the casters in a region.
 pub trait CasterSearch: Sync {
-    /// Walks nested boxes from the outside in: `enter` says of each whether to look inside, `triangle` is given
-    /// every triangle (an index into [`Scene::triangles`](crate::Scene::triangles)) that throws shadows in the boxes
-    /// entered.
-    fn visit(&self, enter: impl FnMut(Aabb) -> bool, triangle: impl FnMut(u32));
+    /// Calls `found` with every triangle (an index into [`Scene::triangles`](crate::Scene::triangles)) that throws
+    /// shadows and may reach into what the half-spaces have in common, each once. All for none.
+    fn each_in(&self, region: &[HalfSpace], found: impl FnMut(u32));
 }
 
 impl Occlusion for Bvh {
@@ -37,7 +37,10 @@ impl Occlusion for Bvh {
 }
 
 impl CasterSearch for Bvh {
-    fn visit(&self, enter: impl FnMut(Aabb) -> bool, triangle: impl FnMut(u32)) {
-        self.visit(enter, triangle);
+    fn each_in(&self, region: &[HalfSpace], mut found: impl FnMut(u32)) {
+        let _never_breaks = self.visit_region(region, |triangle| {
+            found(triangle);
+            ControlFlow::Continue(())
+        });
     }
 }

@@ -80,7 +80,7 @@ pub fn reference(
 
 /// A thread's buffers, kept from pixel to pixel.
 #[derive(Default)]
-struct Scratch {
+pub(super) struct Scratch {
     /// Samples of the light; those above the tangent plane are moved to the front.
     points: Vec<LightPoint>,
     /// Which sample each of those was.
@@ -92,17 +92,18 @@ struct Scratch {
     proofs: Memory,
 }
 
-struct Tracer<'a, O> {
-    casters: &'a O,
-    light: &'a Light,
-    gbuffer: &'a GBuffer,
-    settings: &'a ReferenceSettings,
+pub(super) struct Tracer<'a, O> {
+    pub(super) casters: &'a O,
+    pub(super) light: &'a Light,
+    pub(super) gbuffer: &'a GBuffer,
+    pub(super) settings: &'a ReferenceSettings,
     /// Largest coordinate of the scene.
-    magnitude: f32,
+    pub(super) magnitude: f32,
 }
 
 impl<O: Occlusion> Tracer<'_, O> {
-    fn pixel(&self, pixel: usize, scratch: &mut Scratch, work: &mut Work) -> Estimate {
+    /// V of a pixel by its samples.
+    pub(super) fn pixel(&self, pixel: usize, scratch: &mut Scratch, work: &mut Work) -> Estimate {
         let (position, normal) = (self.gbuffer.position[pixel], self.gbuffer.normal[pixel]);
         let view = LightView::new(self.light, position);
         let strata = if view.is_single() {

@@ -37,6 +37,8 @@ pub struct Work {
     pub proved_dark: u64,
     /// Pixels whose samples were all looked at.
     pub sampled: u64,
+    /// Pixels whose V was computed from areas.
+    pub exact: u64,
 }
 
 impl AddAssign for Work {
@@ -45,6 +47,7 @@ impl AddAssign for Work {
         self.proved_lit += other.proved_lit;
         self.proved_dark += other.proved_dark;
         self.sampled += other.sampled;
+        self.exact += other.exact;
     }
 }
 

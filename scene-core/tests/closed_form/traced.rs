@@ -5,7 +5,7 @@ use std::f32::consts::{PI, TAU};
 use glam::{Affine3A, DVec2, DVec3, Vec3};
 use gnomon_scene_core::bvh::Bvh;
 use gnomon_scene_core::geometry::ObjectFlags;
-use gnomon_scene_core::reference::{exact_reference, no_progress};
+use gnomon_scene_core::reference::{ReferenceSettings, exact_reference, no_progress};
 use gnomon_scene_core::{GBuffer, Light, Scene, TriangleMesh};
 
 use super::{BALL, assert_agreement, ball_truth, floor, formulas, sample, square_over_plane};
@@ -37,7 +37,9 @@ fn assert_traced(scene: &Scene, light: &Light, gbuffer: &GBuffer, truth: impl Fn
 /// Exact V against the formula. Origins are lifted by 2⁻²¹ of the scene's largest coordinate, 4, which moves a shadow by
 /// as much times how fast it moves over the light; f32 receivers and results add some 10⁻⁷.
 fn assert_exact(scene: &Scene, light: &Light, gbuffer: &GBuffer, truth: impl Fn(DVec3) -> f64, bound: f64) {
-    let found = exact_reference(scene, &Bvh::casters(scene), light, gbuffer, &no_progress).unwrap();
+    let settings = ReferenceSettings::default();
+    let found =
+        exact_reference(scene, &Bvh::casters(scene), light, gbuffer, &settings, &no_progress).unwrap();
     for (&position, &v) in gbuffer.position.iter().zip(&found.visibility.values) {
         let expected = truth(position.as_dvec3());
         assert!((f64::from(v) - expected).abs() < bound, "V at {position} is {v}, not {expected}");

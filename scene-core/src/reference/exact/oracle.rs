@@ -1,4 +1,4 @@
-//! The area of a union of convex polygons.
+//! The area of a union of convex polygons, every one of them taken by itself: what tests hold the fast way against.
 //!
 //! The plane is split until few polygons are left in a cell, and there the union is cut into vertical slabs between all
 //! corners and crossings: within one no two edges cross, so the covered length is linear in x and the length in the
