@@ -103,8 +103,7 @@ pub(crate) struct TruthArgs {
     pub(crate) samples: u32,
     /// Compute the visible part of the light's area without sampling: slow, and free of noise
     ///
-    /// For rect and disk lights and those without extent. Pixels whose shadows hang on cut-out masks are still sampled;
-    /// a note says how many.
+    /// For rect and disk lights and those without extent; behind cut-out masks still by samples.
     #[arg(long)]
     pub(crate) exact: bool,
 }
