@@ -1,0 +1,112 @@
+//! The CPU path: one function a stage after pass 2.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rayon::prelude::*;
+use scene_core::{GBuffer, Report, VisibilityImage};
+
+use gnomon_shadow_map::cpu::receiver;
+
+use crate::distance_map::DistanceMap;
+use crate::multi_pass::multi_pass;
+use crate::paper::Paper;
+use crate::params::Variant;
+use crate::physical::{Physical, Site};
+
+/// What a pixel is before pass 4.
+enum Surroundings {
+    Known,
+    Lit,
+    Umbra,
+    Penumbra(Box<Site>),
+}
+
+/// The pixel's site, if pass 4 has to look at it.
+fn surroundings(physical: &Physical<'_>, gbuffer: &GBuffer, pixel: usize) -> Surroundings {
+    if physical.distance.shadow[pixel].is_nan() {
+        return Surroundings::Known;
+    }
+    let Ok(receiver) = receiver(physical.maps, gbuffer, pixel) else { return Surroundings::Known };
+    match physical.site(receiver) {
+        None => Surroundings::Known,
+        Some(site) if physical.params.skip && site.is_lit() => Surroundings::Lit,
+        Some(site) if physical.params.skip && site.is_umbra() => Surroundings::Umbra,
+        Some(site) => Surroundings::Penumbra(Box::new(site)),
+    }
+}
+
+/// `shade.filter`: passes 3 and 4 with `physical` scaling. V of pass 2 stands where they change nothing.
+pub fn filter(physical: &Physical<'_>, visibility: &mut VisibilityImage, report: &mut Report) {
+    if physical.params.variant == Variant::MultiPass {
+        filter_in_passes(physical, visibility, report);
+        return;
+    }
+    let width = physical.distance.width;
+    let rows = visibility.values.par_chunks_mut(width).enumerate();
+    let answer_row = |(row, values): (usize, &mut [f32])| {
+        let (mut lit, mut umbra) = (0u64, 0u64);
+        for (column, value) in values.iter_mut().enumerate() {
+            match surroundings(physical, physical.gbuffer, row * width + column) {
+                Surroundings::Known => {}
+                Surroundings::Lit => lit += 1,
+                Surroundings::Umbra => umbra += 1,
+                Surroundings::Penumbra(site) => {
+                    let blockers = physical.search(&site);
+                    if let Some(mean) = blockers.mean() {
+                        *value = physical.filter(&site, &blockers, mean);
+                    }
+                }
+            }
+        }
+        (lit, umbra)
+    };
+    let (lit, umbra) = rows.map(answer_row).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    report.skip("lit pixels", lit);
+    report.skip("umbra pixels", umbra);
+}
+
+fn filter_in_passes(physical: &Physical<'_>, visibility: &mut VisibilityImage, report: &mut Report) {
+    let pixels = physical.distance.shadow.len();
+    let lit = AtomicU64::new(0);
+    let sites: Vec<Site> = (0..pixels)
+        .into_par_iter()
+        .filter_map(|pixel| match surroundings(physical, physical.gbuffer, pixel) {
+            Surroundings::Penumbra(site) => Some(*site),
+            // Its neighbours may change in a pass and then change it.
+            Surroundings::Umbra => receiver(physical.maps, physical.gbuffer, pixel)
+                .ok()
+                .and_then(|receiver| physical.site(receiver)),
+            Surroundings::Lit => {
+                lit.fetch_add(1, Ordering::Relaxed);
+                None
+            }
+            Surroundings::Known => None,
+        })
+        .collect();
+    let (shadow, skipped) = multi_pass(physical, &sites);
+    write(&shadow, visibility);
+    report.skip("lit pixels", lit.into_inner());
+    report.skip("blurs", skipped);
+}
+
+/// `shade.filter`: passes 3 and 4 with `paper` scaling.
+pub fn filter_as_published(
+    paper: &Paper<'_>,
+    map: &mut DistanceMap,
+    visibility: &mut VisibilityImage,
+    report: &mut Report,
+) {
+    paper.dilate(map);
+    let skipped = paper.blur(map);
+    write(&map.shadow, visibility);
+    report.skip("blurs", skipped);
+}
+
+/// Pass 5: V = 1 − S where there is an S.
+fn write(shadow: &[f32], visibility: &mut VisibilityImage) {
+    for (value, shadow) in visibility.values.iter_mut().zip(shadow) {
+        if !shadow.is_nan() {
+            *value = 1.0 - shadow;
+        }
+    }
+}
