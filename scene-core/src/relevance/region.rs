@@ -50,13 +50,19 @@ impl CasterRegion {
         Self::cut(scene, receivers, planes)
     }
 
+    /// Every caster that is not wholly outside one of `planes`: for a map's own sides, say, what it can hold. A plane
+    /// that is not finite cuts nothing.
+    pub fn inside(scene: &Scene, planes: &[HalfSpace]) -> Self {
+        let mut hull = Polyhedron::from_box(casters_bounds(scene), 0.0);
+        planes.iter().for_each(|&plane| hull.clip(plane));
+        Self { planes: planes.to_vec(), hull }
+    }
+
     fn cut(scene: &Scene, receivers: &Receivers, mut planes: Vec<HalfSpace>) -> Self {
         if receivers.is_empty() {
             return Self { planes: Vec::new(), hull: Polyhedron::EMPTY };
         }
-        let casters = scene.objects().iter().filter(|o| o.flags.casts);
-        let bounds = casters.fold(Aabb::EMPTY, |sum, o| sum.union(o.bounds));
-        let mut hull = Polyhedron::from_box(bounds, receivers.margin);
+        let mut hull = Polyhedron::from_box(casters_bounds(scene), receivers.margin);
         planes.iter().for_each(|&plane| hull.clip(plane));
         // The box around H tells most boxes apart, so its sides come first.
         if let Some((min, max)) = hull.extent() {
@@ -106,6 +112,12 @@ impl CasterRegion {
     pub fn planes(&self) -> &[HalfSpace] {
         &self.planes
     }
+}
+
+/// Bounds of all that casts.
+fn casters_bounds(scene: &Scene) -> Aabb {
+    let casters = scene.objects().iter().filter(|o| o.flags.casts);
+    casters.fold(Aabb::EMPTY, |sum, o| sum.union(o.bounds))
 }
 
 /// Planes around the convex hull of receivers and light, moved out by `margin`.
