@@ -1,0 +1,86 @@
+//! How coarse a map is where it is looked at (section 1.1): d, the size of a texel in the image, in pixels.
+//!
+//! The paper's `d = d_s (r_s/r_i)(cos β/cos α)` is for one direction in a plane. On a surface a texel is a parallelogram;
+//! here d is the mean length of its sides in the image, exact for any warp: with t₁, t₂ spanning the surface, `J_m` the
+//! derivatives of the place in the map along them and `J_i` those of the pixel, the sides are the columns of
+//! `J_i J_m⁻¹` times the texel's size. The mean width of a parallelogram, over all directions that a shadow's edge may
+//! have, is 2/π times the sum of its two sides: wrong pixels along edges grow in proportion to d.
+
+use glam::{DMat2, DVec3};
+
+use crate::seen::Sample;
+use crate::view_frame::ViewFrame;
+use crate::warp::{Warp, Window, at};
+
+/// d at a surface point with the unit normal `normal`, of a map of `map_size` texels a side. Infinite where the map or
+/// the camera sees the surface edge-on.
+pub fn texel_in_pixels(
+    warp: &Warp,
+    window: &Window,
+    map_size: u32,
+    frame: &ViewFrame,
+    point: DVec3,
+    normal: DVec3,
+) -> f64 {
+    let [c1, c2] = texel_sides(warp, window, map_size, frame, point, normal);
+    let d = (c1 + c2) * 0.5;
+    if d.is_nan() { f64::INFINITY } else { d }
+}
+
+/// The lengths of a texel's sides in the image in pixels: along x and along y of the map.
+pub fn texel_sides(
+    warp: &Warp,
+    window: &Window,
+    map_size: u32,
+    frame: &ViewFrame,
+    point: DVec3,
+    normal: DVec3,
+) -> [f64; 2] {
+    let (t1, t2) = normal.any_orthonormal_pair();
+    let w = at(warp.w, point);
+    let place = warp.place(point);
+    let u = (warp.x - warp.w * place.x).truncate() / w;
+    let v = (warp.y - warp.w * place.y).truncate() / w;
+    let [i, j] = frame.pixel_gradients(point);
+    let along = |a: DVec3, b: DVec3| DMat2::from_cols_array(&[a.dot(t1), b.dot(t1), a.dot(t2), b.dot(t2)]);
+    let in_image = along(i, j) * along(u, v).inverse();
+    let texel = window.texel(map_size);
+    [in_image.x_axis.length() * texel.x, in_image.y_axis.length() * texel.y]
+}
+
+/// d over what is seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Aliasing {
+    /// Mean, in pixels a texel.
+    pub mean: f64,
+    /// Median.
+    pub median: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    /// Samples it is of; with none all is 0.
+    pub samples: usize,
+}
+
+impl Aliasing {
+    /// Of values of d; those that are not finite count as samples, and in the percentiles.
+    pub fn of(mut values: Vec<f64>) -> Self {
+        if values.is_empty() {
+            return Self::default();
+        }
+        values.sort_by(f64::total_cmp);
+        let rank = |q: f64| values[((values.len() - 1) as f64 * q).round() as usize];
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        Self { mean, median: rank(0.5), p99: rank(0.99), samples: values.len() }
+    }
+}
+
+/// d of each sample.
+pub fn of_samples(
+    warp: &Warp,
+    window: &Window,
+    map_size: u32,
+    frame: &ViewFrame,
+    samples: &[Sample],
+) -> Vec<f64> {
+    samples.iter().map(|s| texel_in_pixels(warp, window, map_size, frame, s.point, s.normal)).collect()
+}

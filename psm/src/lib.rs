@@ -1,0 +1,132 @@
+#![doc = include_str!("../README.md")]
+
+pub mod aliasing;
+pub mod choice;
+pub mod cpu;
+pub mod light_image;
+pub mod lispsm;
+mod lookup;
+mod params;
+pub mod post_perspective;
+pub mod seen;
+mod technique;
+pub mod view_frame;
+pub mod views;
+pub mod virtual_camera;
+pub mod warp;
+
+use glam::Vec3;
+use gnomon_shadow_map::cpu::answer_points;
+use gnomon_shadow_map::light_maps::LightMaps;
+use gnomon_shadow_map::receiver_plane::plane_tolerance;
+use scene_core::geometry::Aabb;
+use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage, relevance};
+
+pub use lookup::Occluder;
+pub use params::{PsmParams, Show, Variant};
+pub use technique::Factory;
+use view_frame::ViewFrame;
+use views::MapView;
+
+/// The technique: settings, from which any number of frames can be prepared.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Psm {
+    params: PsmParams,
+}
+
+/// A map: the triangle that the light sees at the centre of each texel.
+#[derive(Clone, Debug)]
+pub struct PsmMap {
+    /// Its projection.
+    pub view: MapView,
+    /// Texels a side.
+    pub size: u32,
+    /// Row by row from the top left, as indices into [`Scene::triangles`]; [`GBuffer::NOTHING`] where there is none.
+    pub triangles: Vec<u32>,
+}
+
+/// A light, prepared for one frame, borrowing the scene it shines on.
+#[derive(Debug)]
+pub struct PreparedPsm<'a> {
+    /// Light, tolerance and what all receivers are asked first; its own maps are none.
+    questions: LightMaps<'a>,
+    maps: Vec<PsmMap>,
+    frame: ViewFrame,
+    params: PsmParams,
+}
+
+impl Psm {
+    /// A technique with these settings.
+    pub fn new(params: PsmParams) -> Self {
+        Self { params }
+    }
+
+    /// Draws the maps of `light` for what `camera` sees in `gbuffer`. They hold for this G-buffer alone.
+    pub fn prepare<'a>(
+        &self,
+        scene: &'a Scene,
+        light: &Light,
+        camera: &Camera,
+        gbuffer: &GBuffer,
+    ) -> (PreparedPsm<'a>, Report) {
+        let (mut report, params) = (Report::default(), self.params);
+        let tolerance = plane_tolerance(scene.bounds(), light);
+        let casters = relevance::told_apart(scene, light, tolerance);
+        report.skip("casters", casters.backdrops.len() as u64);
+        let views = report.time("prepare.views", |_| {
+            let bounds = casters.drawn.iter().fold(Aabb::EMPTY, |sum, object| sum.union(object.bounds));
+            views::map_views(scene, light, camera, gbuffer, bounds, &params)
+        });
+        let maps =
+            report.time("prepare.maps", |report| cpu::render_maps(scene, &casters, views, &params, report));
+        report.bytes = maps.iter().map(|map| map.triangles.len() as u64 * 4).sum();
+        let backdrops = casters.backdrops;
+        let questions = LightMaps { scene, light: *light, maps: Vec::new(), backdrops, tolerance };
+        (PreparedPsm { questions, maps, frame: ViewFrame::new(camera), params }, report)
+    }
+}
+
+impl PreparedPsm<'_> {
+    /// The maps: none if nothing can be in shadow, one, or one a face of the cube around the light.
+    pub fn maps(&self) -> &[PsmMap] {
+        &self.maps
+    }
+
+    /// The map that holds `point`, and the texel it falls into.
+    #[inline]
+    fn map_of(&self, point: Vec3) -> Option<(&PsmMap, [usize; 2])> {
+        self.maps.iter().find_map(|map| map.texel_of(point).map(|texel| (map, texel)))
+    }
+
+    /// Fills `visibility`, which must have the size of the G-buffer that was prepared for: V where a surface is seen,
+    /// NaN elsewhere. A receiver of another G-buffer that lies in no map is taken for lit.
+    pub fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Report {
+        let mut report = Report::default();
+        report.time("shade.lookup", |_| cpu::shade(self, gbuffer, visibility));
+        report
+    }
+
+    /// V at free points, by what the maps hold: a point whose ray to the light meets no receiver that the camera saw
+    /// lies in no map, and is lit as far as anyone knows; beyond the last receiver of its ray everything is behind
+    /// what the map holds. NaN for a point that is not finite. The slices must be of equal length: what the longer one
+    /// has more is left alone.
+    pub fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Report {
+        let mut report = Report::default();
+        let LightMaps { scene, light, tolerance, .. } = &self.questions;
+        report.time("shade.lookup", |_| {
+            answer_points(points, visibility, |point| {
+                if !point.is_finite() {
+                    return f32::NAN;
+                }
+                if !light.reaches(point) {
+                    return 0.0;
+                }
+                let shadowed = self
+                    .map_of(point)
+                    .is_some_and(|(map, texel)| map.shadows_free(scene, light, point, *tolerance, texel));
+                if shadowed || self.questions.is_behind_backdrop(point) { 0.0 } else { 1.0 }
+            });
+        });
+        report
+    }
+}

@@ -1,0 +1,132 @@
+//! The trait's implementation, nothing else.
+
+use std::sync::OnceLock;
+
+use glam::Vec3;
+use scene_core::technique::{
+    Capability, Description, Params, PreparedShadow, Setting, SettingsError, ShadowQuery, ShadowTechnique,
+    Support, TechniqueError, TechniqueFactory,
+};
+use scene_core::{GBuffer, Report, VisibilityImage, raster};
+
+use crate::{PreparedPsm, Psm, PsmParams};
+
+impl ShadowTechnique for Psm {
+    fn name(&self) -> &'static str {
+        PsmParams::TECHNIQUE
+    }
+
+    fn describe(&self) -> Description {
+        const CENTRE: Support = Support::Approximate("an extended light is taken for its centre");
+        let support = |capability| match capability {
+            Capability::DirectionalLight
+            | Capability::PointLight
+            | Capability::SpotLight
+            | Capability::AlphaMask
+            | Capability::TriangleSoup => Support::Exact,
+            Capability::Sun | Capability::SphereLight | Capability::RectLight | Capability::DiskLight => {
+                CENTRE
+            }
+            Capability::FreePoints => Support::Approximate(
+                "only what shadows the camera's view is in the map: elsewhere points are lit",
+            ),
+            Capability::Gpu => Support::Unsupported("this technique has a CPU path only"),
+        };
+        Description {
+            summary: SUMMARY,
+            support: Capability::ALL
+                .into_iter()
+                .map(|capability| (capability, support(capability)))
+                .collect(),
+        }
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        self.params.to_json()
+    }
+
+    fn prepare<'a>(
+        &self,
+        query: &ShadowQuery<'a>,
+    ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError> {
+        Ok((
+            Box::new(ForAnyFrame { technique: *self, query: *query, free: OnceLock::new() }),
+            Report::default(),
+        ))
+    }
+}
+
+/// The maps depend on what is seen, and the trait shows that when it shades: then they are drawn, stage by stage under
+/// the same names, for the G-buffer at hand.
+struct ForAnyFrame<'a> {
+    technique: Psm,
+    query: ShadowQuery<'a>,
+    /// For free points: the maps of what the camera sees.
+    free: OnceLock<PreparedPsm<'a>>,
+}
+
+impl PreparedShadow for ForAnyFrame<'_> {
+    fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError> {
+        if visibility.values.len() != gbuffer.pixel_count() {
+            let (expected, got) = (gbuffer.pixel_count(), visibility.values.len());
+            return Err(TechniqueError::OutputSize { expected, got });
+        }
+        let ShadowQuery { scene, light, camera } = self.query;
+        let (prepared, mut report) = self.technique.prepare(scene, light, camera, gbuffer);
+        report.merge(&prepared.shade(gbuffer, visibility));
+        Ok(report)
+    }
+
+    fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Result<Report, TechniqueError> {
+        if points.len() != visibility.len() {
+            return Err(TechniqueError::OutputSize { expected: points.len(), got: visibility.len() });
+        }
+        let ShadowQuery { scene, light, camera } = self.query;
+        let mut report = Report::default();
+        let prepared = self.free.get_or_init(|| {
+            let gbuffer = raster::render_gbuffer(scene, camera);
+            let (prepared, drawn) = self.technique.prepare(scene, light, camera, &gbuffer);
+            report = drawn;
+            prepared
+        });
+        report.merge(&prepared.visibility_at(points, visibility));
+        Ok(report)
+    }
+
+    fn survives_camera(&self) -> bool {
+        false
+    }
+}
+
+const SUMMARY: &str =
+    "shadow maps with texels where the camera looks; hard shadows, drawn anew for every view";
+
+/// Makes [`Psm`]s from settings given as text.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Factory;
+
+impl TechniqueFactory for Factory {
+    fn name(&self) -> &'static str {
+        PsmParams::TECHNIQUE
+    }
+
+    fn summary(&self) -> &'static str {
+        SUMMARY
+    }
+
+    fn settings(&self) -> &'static [Setting] {
+        PsmParams::SETTINGS
+    }
+
+    fn presets(&self) -> Vec<&'static str> {
+        PsmParams::PRESETS.iter().map(|preset| preset.name).collect()
+    }
+
+    fn create(
+        &self,
+        preset: Option<&str>,
+        overrides: &[(String, String)],
+    ) -> Result<Box<dyn ShadowTechnique>, SettingsError> {
+        Ok(Box::new(Psm::new(PsmParams::from_overrides(preset, overrides)?)))
+    }
+}
