@@ -63,7 +63,7 @@ impl<C: CasterSearch> Gatherer<'_, C> {
     ) {
         if !receivers.is_empty() {
             let whole = self.gather(receivers);
-            self.descend(whole, side, solve);
+            self.descend(&whole, side, solve);
         }
     }
 
@@ -79,7 +79,7 @@ impl<C: CasterSearch> Gatherer<'_, C> {
         Block { receivers, triangles }
     }
 
-    fn descend(&self, block: Block, side: u32, solve: &mut impl FnMut(&Receiver, &Patch)) {
+    fn descend(&self, block: &Block, side: u32, solve: &mut impl FnMut(&Receiver, &Patch)) {
         if block.receivers.len() > 1 && side > 1 && !block.triangles.is_empty() {
             let half = side / 2;
             let quarter = |receiver: &Receiver| {
@@ -97,7 +97,7 @@ impl<C: CasterSearch> Gatherer<'_, C> {
                 .collect();
             let parted = parts.iter().map(Block::cost).sum::<usize>();
             if block.triangles.len() > MANY || parted < block.cost() {
-                for part in parts {
+                for part in &parts {
                     self.descend(part, half, solve);
                 }
                 return;
