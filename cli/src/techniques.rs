@@ -5,8 +5,13 @@ use scene_core::technique::{SettingKind, ShadowTechnique, TechniqueFactory};
 use crate::error::CliError;
 
 /// Every technique, in the order of the tables.
-pub(crate) fn all() -> [&'static dyn TechniqueFactory; 3] {
-    [&gnomon_shadow_map::Factory, &gnomon_psm::Factory, &gnomon_contact_hardening::Factory]
+pub(crate) fn all() -> [&'static dyn TechniqueFactory; 4] {
+    [
+        &gnomon_shadow_map::Factory,
+        &gnomon_psm::Factory,
+        &gnomon_pdsm::Factory,
+        &gnomon_contact_hardening::Factory,
+    ]
 }
 
 /// The technique called `name`.

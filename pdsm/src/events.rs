@@ -1,0 +1,186 @@
+//! Visibility events of a PDSM pixel: where along its ray the shadow of one map begins or ends.
+
+/// An event as a number that sorts by depth, entries before exits at the same depth.
+///
+/// The upper 31 bits are those of t in an order that whole numbers have (sign bit flipped, negative ones inverted); the
+/// lowest is 1 for an exit. So t is kept to 2 ulps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Event(u32);
+
+impl Event {
+    /// The shadow begins at `t`, or ends there.
+    #[inline]
+    pub fn new(t: f32, is_exit: bool) -> Self {
+        let bits = t.to_bits();
+        let ordered = bits ^ ((bits as i32 >> 31) as u32 | 0x8000_0000);
+        Self(ordered & !1 | u32::from(is_exit))
+    }
+
+    /// Depth along the ray, to 2 ulps.
+    #[inline]
+    pub fn t(self) -> f32 {
+        let ordered = self.0 & !1;
+        let flip = if ordered & 0x8000_0000 != 0 { 0x8000_0000 } else { u32::MAX };
+        f32::from_bits(ordered ^ flip)
+    }
+
+    /// Whether the shadow ends.
+    #[inline]
+    pub fn is_exit(self) -> bool {
+        self.0 & 1 == 1
+    }
+}
+
+/// An event and where in its strip of rows the pixel is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlacedEvent {
+    /// Pixel of the strip, row by row.
+    pub pixel: u32,
+    /// What happens.
+    pub event: Event,
+}
+
+/// Events of many maps, sorted into strips of PDSM rows as they come: what is kept between maps.
+#[derive(Clone, Debug)]
+pub struct EventStrips {
+    size: u32,
+    rows: u32,
+    strips: Vec<Vec<PlacedEvent>>,
+}
+
+impl EventStrips {
+    /// Strips of a PDSM of `size` × `size` pixels.
+    pub fn new(size: u32) -> Self {
+        // Some 32 strips: enough to share among threads, few enough to be written to side by side.
+        let rows = size.div_ceil(32).max(1);
+        Self { size, rows, strips: vec![Vec::new(); size.div_ceil(rows) as usize] }
+    }
+
+    /// Pixels a side of the PDSM.
+    pub fn size(&self) -> u32 {
+        self.size
+    }
+
+    /// Adds an event of the pixel in column `x`, row `y`, both below [`size`](Self::size).
+    #[inline]
+    pub fn push(&mut self, x: u32, y: u32, event: Event) {
+        let strip = y / self.rows;
+        let pixel = (y - strip * self.rows) * self.size + x;
+        self.strips[strip as usize].push(PlacedEvent { pixel, event });
+    }
+
+    /// Events in all.
+    pub fn len(&self) -> usize {
+        self.strips.iter().map(Vec::len).sum()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// How many strips there are.
+    pub fn strip_count(&self) -> usize {
+        self.strips.len()
+    }
+
+    /// Rows of strip `index`.
+    pub fn strip_rows(&self, index: usize) -> u32 {
+        (self.size - index as u32 * self.rows).min(self.rows)
+    }
+
+    /// Events of strip `index`, in the order they came.
+    pub fn strip(&self, index: usize) -> &[PlacedEvent] {
+        &self.strips[index]
+    }
+}
+
+/// Events of a strip by pixel, each pixel's in ascending order.
+#[derive(Clone, Debug, Default)]
+pub struct SortedStrip {
+    /// Where each pixel's events start, and their end.
+    starts: Vec<u32>,
+    events: Vec<Event>,
+}
+
+impl SortedStrip {
+    /// Sorts the events that several collections hold for one strip of `pixels` pixels: a counting sort by pixel, then
+    /// each pixel's few by depth. The order in which they came leaves no trace.
+    pub fn sort(&mut self, pixels: usize, parts: &[&[PlacedEvent]]) {
+        self.starts.clear();
+        self.starts.resize(pixels + 1, 0);
+        for placed in parts.iter().copied().flatten() {
+            self.starts[placed.pixel as usize + 1] += 1;
+        }
+        for pixel in 0..pixels {
+            self.starts[pixel + 1] += self.starts[pixel];
+        }
+        let total = self.starts[pixels] as usize;
+        self.events.clear();
+        self.events.resize(total, Event(0));
+        // Each start is moved to its end while placing, and stands for the next one's start thereafter.
+        for placed in parts.iter().copied().flatten() {
+            let slot = &mut self.starts[placed.pixel as usize];
+            self.events[*slot as usize] = placed.event;
+            *slot += 1;
+        }
+        self.starts.rotate_right(1);
+        self.starts[0] = 0;
+        for pixel in 0..pixels {
+            let range = self.starts[pixel] as usize..self.starts[pixel + 1] as usize;
+            self.events[range].sort_unstable();
+        }
+    }
+
+    /// Events of a pixel, ascending.
+    pub fn pixel(&self, pixel: usize) -> &[Event] {
+        &self.events[self.starts[pixel] as usize..self.starts[pixel + 1] as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn events_sort_by_depth_and_entries_come_first() {
+        let depths = [-7.5f32, -1e-9, 0.0, 1e-30, 0.5, 0.75];
+        for pair in depths.windows(2) {
+            assert!(Event::new(pair[0], true) < Event::new(pair[1], false), "{pair:?}");
+        }
+        assert!(Event::new(0.5, false) < Event::new(0.5, true));
+        for t in depths {
+            let event = Event::new(t, true);
+            assert!((event.t() - t).abs() <= t.abs() * 2.4e-7 + f32::MIN_POSITIVE && event.is_exit());
+        }
+    }
+
+    #[test]
+    fn a_strip_keeps_every_event_at_its_pixel() {
+        let mut strips = EventStrips::new(100);
+        for i in 0..1000u32 {
+            strips.push(i * 7 % 100, i * 13 % 100, Event::new((i % 17) as f32, i % 2 == 1));
+        }
+        let mut sorted = SortedStrip::default();
+        let mut count = 0;
+        for index in 0..strips.strip_count() {
+            let pixels = 100 * strips.strip_rows(index) as usize;
+            let (front, back) = strips.strip(index).split_at(strips.strip(index).len() / 2);
+            sorted.sort(pixels, &[back, front]);
+            for pixel in 0..pixels {
+                let events = sorted.pixel(pixel);
+                assert!(events.is_sorted());
+                let mut expected: Vec<_> = strips
+                    .strip(index)
+                    .iter()
+                    .filter(|e| e.pixel as usize == pixel)
+                    .map(|e| e.event)
+                    .collect();
+                expected.sort();
+                assert_eq!(events, expected);
+                count += events.len();
+            }
+        }
+        assert_eq!(count, 1000);
+    }
+}

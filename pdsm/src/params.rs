@@ -1,0 +1,115 @@
+//! Settings and the quality ladder.
+
+use scene_core::technique::{Params, Preset, Setting, SettingKind};
+use serde::{Deserialize, Serialize};
+
+/// Settings of [`Pdsm`](crate::Pdsm).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PdsmParams {
+    /// Shadow maps, one from each of as many points of the light: V has that many levels, and noise falls with their
+    /// number. Construction time is in proportion. A light without extent takes one.
+    pub views: u32,
+    /// Texels a side of each shadow map. Rounded up to a multiple of `pdsm_size`.
+    pub map_size: u32,
+    /// Pixels a side of the PDSM. What is between its pixels is interpolated.
+    pub pdsm_size: u32,
+    /// How far the compressed V may be from that of the maps; below 1/(2·`views`) compression saves little.
+    pub max_error: f32,
+    /// Interpolate between the four nearest pixels; off reads the nearest one, and costs a quarter.
+    pub bilinear: bool,
+    /// Leave out what cannot change the image: rows of maps in which no caster is. Off only to measure.
+    pub skip: bool,
+    /// The same seed gives the same samples of the light.
+    pub seed: u64,
+}
+
+impl PdsmParams {
+    const fn with(views: u32, size: u32, max_error: f32) -> Self {
+        Self { views, map_size: size, pdsm_size: size, max_error, bilinear: true, skip: true, seed: 0 }
+    }
+}
+
+impl Default for PdsmParams {
+    fn default() -> Self {
+        Self::with(64, 512, 0.01)
+    }
+}
+
+impl Params for PdsmParams {
+    const TECHNIQUE: &'static str = "pdsm";
+
+    const SETTINGS: &'static [Setting] = &[
+        Setting {
+            name: "views",
+            kind: SettingKind::Int { min: 1, max: 4096 },
+            unit: "maps",
+            doc: "shadow maps, one from each of as many points of the light",
+        },
+        Setting {
+            name: "map_size",
+            kind: SettingKind::Int { min: 1, max: 8192 },
+            unit: "texels a side",
+            doc: "resolution of each map, rounded up to a multiple of pdsm_size",
+        },
+        Setting {
+            name: "pdsm_size",
+            kind: SettingKind::Int { min: 1, max: 4096 },
+            unit: "pixels a side",
+            doc: "resolution of the PDSM",
+        },
+        Setting {
+            name: "max_error",
+            kind: SettingKind::Float { min: 0.0, max: 0.5 },
+            unit: "V",
+            doc: "how far compression may move V",
+        },
+        Setting {
+            name: "bilinear",
+            kind: SettingKind::Bool,
+            unit: "",
+            doc: "interpolate between the four nearest pixels",
+        },
+        Setting {
+            name: "skip",
+            kind: SettingKind::Bool,
+            unit: "",
+            doc: "leave out what cannot change the image",
+        },
+        Setting {
+            name: "seed",
+            kind: SettingKind::Int { min: 0, max: u64::MAX },
+            unit: "",
+            doc: "the same seed gives the same samples of the light",
+        },
+    ];
+
+    const PRESETS: &'static [Preset<Self>] = &[
+        Preset { name: "low", params: Self::with(16, 256, 0.04) },
+        Preset { name: "medium", params: Self::with(64, 512, 0.01) },
+        Preset { name: "high", params: Self::with(144, 768, 0.005) },
+        Preset { name: "ultra", params: Self::with(256, 1024, 0.0025) },
+    ];
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn metadata_matches_the_struct() {
+        assert_eq!(PdsmParams::check_metadata(), Ok(()));
+    }
+
+    #[test]
+    fn overrides_are_checked() {
+        let set = |key: &str, value: &str| {
+            PdsmParams::from_overrides(Some("low"), &[(key.to_owned(), value.to_owned())])
+        };
+        assert_eq!(set("views", "9").unwrap().views, 9);
+        for (key, value) in [("views", "0"), ("max_error", "0.9"), ("max_error", "NaN"), ("map_size", "9000")]
+        {
+            assert!(set(key, value).is_err(), "{key}={value}");
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! The trait's implementation, nothing else.
+
+use glam::Vec3;
+use scene_core::technique::{
+    Capability, Description, Params, PreparedShadow, Setting, SettingsError, ShadowQuery, ShadowTechnique,
+    Support, TechniqueError, TechniqueFactory,
+};
+use scene_core::{GBuffer, Report, VisibilityImage};
+
+use crate::{Pdsm, PdsmParams, PreparedPdsm};
+
+impl ShadowTechnique for Pdsm {
+    fn name(&self) -> &'static str {
+        PdsmParams::TECHNIQUE
+    }
+
+    fn describe(&self) -> Description {
+        let support = |capability| match capability {
+            Capability::DirectionalLight
+            | Capability::Sun
+            | Capability::PointLight
+            | Capability::SpotLight
+            | Capability::RectLight
+            | Capability::DiskLight => Support::Exact,
+            Capability::SphereLight => {
+                Support::Approximate("a sphere is taken for the disk that the middle of the casters sees")
+            }
+            Capability::AlphaMask | Capability::TriangleSoup => Support::Exact,
+            Capability::FreePoints => Support::Exact,
+            Capability::Gpu => Support::Unsupported("the CPU path is the only one so far"),
+        };
+        Description {
+            summary: SUMMARY,
+            support: Capability::ALL.map(|capability| (capability, support(capability))).to_vec(),
+        }
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        self.params.to_json()
+    }
+
+    fn prepare<'a>(
+        &self,
+        query: &ShadowQuery<'a>,
+    ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError> {
+        let (prepared, report) = Pdsm::prepare(self, query.scene, query.light);
+        Ok((Box::new(prepared), report))
+    }
+}
+
+impl PreparedShadow for PreparedPdsm<'_> {
+    fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError> {
+        if visibility.values.len() != gbuffer.pixel_count() {
+            let (expected, got) = (gbuffer.pixel_count(), visibility.values.len());
+            return Err(TechniqueError::OutputSize { expected, got });
+        }
+        Ok(PreparedPdsm::shade(self, gbuffer, visibility))
+    }
+
+    fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Result<Report, TechniqueError> {
+        if points.len() != visibility.len() {
+            return Err(TechniqueError::OutputSize { expected: points.len(), got: visibility.len() });
+        }
+        Ok(PreparedPdsm::visibility_at(self, points, visibility))
+    }
+
+    fn survives_camera(&self) -> bool {
+        true
+    }
+}
+
+const SUMMARY: &str =
+    "many shadow maps of an extended light, merged into one function of depth a ray; baked soft shadows";
+
+/// Makes [`Pdsm`]s from settings given as text.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Factory;
+
+impl TechniqueFactory for Factory {
+    fn name(&self) -> &'static str {
+        PdsmParams::TECHNIQUE
+    }
+
+    fn summary(&self) -> &'static str {
+        SUMMARY
+    }
+
+    fn settings(&self) -> &'static [Setting] {
+        PdsmParams::SETTINGS
+    }
+
+    fn presets(&self) -> Vec<&'static str> {
+        PdsmParams::PRESETS.iter().map(|preset| preset.name).collect()
+    }
+
+    fn create(
+        &self,
+        preset: Option<&str>,
+        overrides: &[(String, String)],
+    ) -> Result<Box<dyn ShadowTechnique>, SettingsError> {
+        Ok(Box::new(Pdsm::new(PdsmParams::from_overrides(preset, overrides)?)))
+    }
+}

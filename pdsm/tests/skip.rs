@@ -1,0 +1,26 @@
+//! Leaving rows of maps out never changes an image, bit for bit.
+
+use gnomon_pdsm::{Pdsm, PdsmParams};
+use scene_core::{VisibilityImage, raster, scenes};
+
+#[test]
+fn skipping_never_changes_the_image() {
+    for spec in ["quads", "ball", "knot", "edges"] {
+        let mut setup = scenes::build(spec, 0.0).expect("a built-in scene");
+        (setup.camera.width, setup.camera.height) = (96, 72);
+        let gbuffer = raster::render_gbuffer(&setup.scene, &setup.camera);
+        let shade = |skip| {
+            let params = PdsmParams { views: 9, map_size: 96, pdsm_size: 96, skip, ..Default::default() };
+            let (pdsm, report) = Pdsm::new(params).prepare(&setup.scene, &setup.lights[0]);
+            let mut image = VisibilityImage::new(setup.camera.width, setup.camera.height);
+            pdsm.shade(&gbuffer, &mut image);
+            (
+                image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>(),
+                report.skipped["map rows without casters"],
+            )
+        };
+        let ((with, rows), (without, none)) = (shade(true), shade(false));
+        assert!(rows > 0 && none == 0, "{spec}: {rows}");
+        assert_eq!(with, without, "{spec}");
+    }
+}
