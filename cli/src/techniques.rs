@@ -5,10 +5,11 @@ use scene_core::technique::{SettingKind, ShadowTechnique, TechniqueFactory};
 use crate::error::CliError;
 
 /// Every technique, in the order of the tables.
-pub(crate) fn all() -> [&'static dyn TechniqueFactory; 4] {
+pub(crate) fn all() -> [&'static dyn TechniqueFactory; 5] {
     [
         &gnomon_shadow_map::Factory,
         &gnomon_psm::Factory,
+        &gnomon_stencil_volumes::Factory,
         &gnomon_pdsm::Factory,
         &gnomon_contact_hardening::Factory,
     ]

@@ -57,7 +57,7 @@ pub fn render_gbuffer_with(scene: &Scene, camera: &Camera, scratch: &mut RasterS
 
 /// The camera's matrix from the axes its rays are made of, in f64: far from the origin the f32 one is off by
 /// whole pixels.
-fn clip_from_world(camera: &Camera) -> DMat4 {
+pub(super) fn clip_from_world(camera: &Camera) -> DMat4 {
     let axes = camera.world_from_view_rotation().as_dmat3();
     let rotation = axes.transpose();
     let view_from_world = DMat4::from_cols(

@@ -49,6 +49,7 @@ mod layers;
 mod pixels;
 mod projection;
 mod small;
+mod snapped;
 mod spans;
 
 pub use depth::{
@@ -58,6 +59,7 @@ pub use depth::{
 pub use draw::RasterScratch;
 pub use gbuffer::{render_gbuffer, render_gbuffer_with};
 pub use layers::{LayerCounts, count_layers};
+pub use snapped::SnappedView;
 
 /// The longest side of a target in pixels.
 pub const MAX_SIDE: u32 = crate::Camera::MAX_SIDE;

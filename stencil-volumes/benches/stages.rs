@@ -1,0 +1,84 @@
+//! Shadow volumes against one shadow ray a pixel; `auto` against `z-fail`; what culling saves; silhouettes a second.
+//!
+//! Rays get their tree for nothing and volumes their edges: both live as long as the scene does, and both are timed on
+//! their own.
+
+#[path = "../tests/truth/mod.rs"]
+mod truth;
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use gnomon_stencil_volumes::silhouette::extract;
+use gnomon_stencil_volumes::{Casters, Count, StencilVolumes, VolumeParams};
+use scene_core::bvh::Bvh;
+use scene_core::geometry::facing;
+use scene_core::{Camera, VisibilityImage, raster, scenes};
+
+fn methods(criterion: &mut Criterion) {
+    for spec in ["ball", "knot", "log-cabin", "chess"] {
+        let setup = scenes::build(spec, 0.0).expect("a built-in scene");
+        let (scene, light, camera) = (&setup.scene, setup.lights[0], setup.camera.with_size(512, 512));
+        let gbuffer = raster::render_gbuffer(scene, &camera);
+        let casters = Casters::new(scene).expect("no masks");
+        let bvh = Bvh::casters(scene);
+        let mut visibility = VisibilityImage::new(512, 512);
+        let mut group = criterion.benchmark_group(format!("hard-shadow/{spec}"));
+        group.sample_size(20);
+        for (name, count) in [("z-pass", Count::ZPass), ("z-fail", Count::ZFail), ("auto", Count::Auto)] {
+            let technique = StencilVolumes::new(VolumeParams { count, ..Default::default() });
+            group.bench_function(format!("volumes: {name}"), |b| {
+                b.iter(|| technique.prepare(&casters, &light, &camera).0.shade(&gbuffer, &mut visibility));
+            });
+        }
+        group.bench_function("volumes: edges of the scene", |b| b.iter(|| black_box(Casters::new(scene))));
+        group.bench_function("rays: trace", |b| b.iter(|| truth::trace(scene, &bvh, &light, &gbuffer)));
+        group.bench_function("rays: tree of the scene", |b| b.iter(|| black_box(Bvh::casters(scene))));
+        group.finish();
+    }
+}
+
+/// A view of a corner of a large scene, with culling and without.
+fn culling(criterion: &mut Criterion) {
+    for spec in ["street", "forest:triangles=200000"] {
+        let setup = scenes::build(spec, 0.0).expect("a built-in scene");
+        let (scene, light) = (&setup.scene, setup.lights[0]);
+        let camera = Camera { fov_y: 0.12, ..setup.camera.with_size(256, 256) };
+        let gbuffer = raster::render_gbuffer(scene, &camera);
+        let casters = Casters::new(scene).expect("no masks");
+        let mut visibility = VisibilityImage::new(256, 256);
+        let mut group = criterion.benchmark_group(format!("culling/{spec}"));
+        group.sample_size(10);
+        for skip in [true, false] {
+            let technique = StencilVolumes::new(VolumeParams { skip, ..Default::default() });
+            group.bench_function(format!("skip {skip}"), |b| {
+                b.iter(|| technique.prepare(&casters, &light, &camera).0.shade(&gbuffer, &mut visibility));
+            });
+        }
+        group.finish();
+    }
+}
+
+fn silhouettes(criterion: &mut Criterion) {
+    let setup = scenes::build("chess", 0.0).expect("a built-in scene");
+    let scene = &setup.scene;
+    let casters = Casters::new(scene).expect("no masks");
+    let facing = facing(scene.positions(), scene.triangles(), setup.lights[0].center());
+    // What a pass must read: both vertex indices of an edge, its row, and its faces with their facing.
+    let edges = casters.topology.len();
+    let incidences: usize = (0..edges).map(|e| casters.topology.faces(e).len()).sum();
+    let bytes = (edges * (8 + 4) + incidences * (4 + 1)) as u64;
+    let mut group = criterion.benchmark_group("silhouette");
+    for (name, throughput) in
+        [("edges", Throughput::Elements(edges as u64)), ("bytes", Throughput::Bytes(bytes))]
+    {
+        group.throughput(throughput);
+        group.bench_function(name, |b| {
+            b.iter(|| black_box(extract(&casters.topology, scene.positions(), &facing)));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, methods, culling, silhouettes);
+criterion_main!(benches);

@@ -1,0 +1,323 @@
+//! A block of tiles: what its tiles see, how they hang together, and their counts.
+
+use fearless_simd::Simd;
+use glam::DVec3;
+use scene_core::bvh::shadow_origin;
+use scene_core::light::LightPoint;
+use scene_core::raster::SnappedView;
+
+use super::tile::{PIXELS, Tile};
+use super::{Asked, BLOCK, BLOCK_TILES, Receivers, TILE, Work};
+use crate::bounds::{BoxGroup, LANES};
+use crate::crossing::{SideFromApex, crossing};
+use crate::volumes::{Start, Volumes};
+
+/// Tiles of a block.
+const TILES: usize = BLOCK_TILES * BLOCK_TILES;
+
+/// A chord from a tile's start to the start of the tile it hangs on.
+#[derive(Clone, Copy, Debug, Default)]
+struct Link {
+    /// The tile it hangs on, or itself for the first.
+    parent: usize,
+    /// The start's count less that of the parent's start.
+    change: i32,
+}
+
+/// The outline of a triangle as seen from the eye: the planes through the eye and its edges.
+struct Outline {
+    triangle: u32,
+    edges: [DVec3; 3],
+}
+
+impl Outline {
+    const NONE: Self = Self { triangle: u32::MAX, edges: [DVec3::ZERO; 3] };
+
+    fn new(receivers: &Receivers<'_>, triangle: u32, eye: DVec3) -> Self {
+        let [a, b, c] = receivers.scene.corners(triangle as usize).map(|p| p.as_dvec3() - eye);
+        Self { triangle, edges: [a.cross(b), b.cross(c), c.cross(a)] }
+    }
+
+    /// Whether a direction from the eye passes through the triangle.
+    fn holds(&self, direction: DVec3) -> bool {
+        let [a, b, c] = self.edges.map(|normal| normal.dot(direction));
+        (a > 0.0 && b > 0.0 && c > 0.0) || (a < 0.0 && b < 0.0 && c < 0.0)
+    }
+}
+
+/// A block of the image.
+#[derive(Debug)]
+pub(super) struct Block {
+    tiles: Vec<Tile>,
+    links: [Link; TILES],
+    /// The first tile's start.
+    pub(super) start: Option<Start>,
+    /// Its count.
+    pub(super) start_count: i32,
+    /// Per row, a bit a pixel: lit.
+    pub(super) lit: [u64; BLOCK],
+    /// What was done.
+    pub(super) work: Work,
+    /// The rectangle of centres of the block.
+    min: [f64; 2],
+    max: [f64; 2],
+}
+
+impl Block {
+    /// Looks at the pixels from `corner` on.
+    pub(super) fn new(volumes: &Volumes, receivers: &Receivers<'_>, corner: [usize; 2]) -> Self {
+        let center = |x: usize, y: usize| SnappedView::center(x as u32, y as u32).map(f64::from);
+        let last = [corner[0] + BLOCK - 1, corner[1] + BLOCK - 1];
+        let mut block = Self {
+            tiles: Vec::new(),
+            links: [Link::default(); TILES],
+            start: None,
+            start_count: 0,
+            lit: [0; BLOCK],
+            work: Work::default(),
+            min: center(corner[0], corner[1]),
+            max: center(last[0], last[1]),
+        };
+        block.tiles.resize(TILES, Tile::EMPTY);
+        for index in 0..TILES {
+            let at = [index % BLOCK_TILES * TILE, index / BLOCK_TILES * TILE];
+            block.tiles[index].corner = center(corner[0] + at[0], corner[1] + at[1]);
+            block.look(index, volumes, receivers, corner, at);
+        }
+        block.hang(volumes);
+        block
+    }
+
+    /// Packs the asked pixels of a tile.
+    fn look(
+        &mut self,
+        index: usize,
+        volumes: &Volumes,
+        receivers: &Receivers<'_>,
+        corner: [usize; 2],
+        at: [usize; 2],
+    ) {
+        let gbuffer = receivers.gbuffer;
+        let mut seen = Outline::NONE;
+        let (width, height) = (gbuffer.width as usize, gbuffer.height as usize);
+        let tile = &mut self.tiles[index];
+        for row in 0..TILE {
+            for column in 0..TILE {
+                let (bx, by) = (at[0] + column, at[1] + row);
+                let (x, y) = (corner[0] + bx, corner[1] + by);
+                if x >= width || y >= height {
+                    continue;
+                }
+                let pixel = y * width + x;
+                match receivers.ask(pixel) {
+                    Asked::Nothing => {}
+                    Asked::Lit => self.lit[by] |= 1 << bx,
+                    Asked::Dark => self.work.unreached += 1,
+                    Asked::Yes => {
+                        let origin = shadow_origin(
+                            gbuffer.position[pixel],
+                            gbuffer.normal[pixel],
+                            receivers.magnitude,
+                        );
+                        // Where rays see no shadow there is none to be counted.
+                        if !origin.is_finite() {
+                            self.lit[by] |= 1 << bx;
+                            continue;
+                        }
+                        if seen.triangle != gbuffer.triangle[pixel] {
+                            seen = Outline::new(receivers, gbuffer.triangle[pixel], volumes.screen.eye);
+                        }
+                        let from_eye = gbuffer.position[pixel].as_dvec3() - volumes.screen.eye;
+                        if !seen.holds(from_eye) || volumes.crosses_near_cap(from_eye) {
+                            let lit = !volumes.tree.is_occluded(origin, receivers.light.center());
+                            self.lit[by] |= u64::from(lit) << bx;
+                            self.work.traced += 1;
+                            continue;
+                        }
+                        let place = origin.to_array().map(f64::from);
+                        tile.push(row * TILE + column, place, f64::from(gbuffer.depth[pixel]));
+                    }
+                }
+            }
+        }
+        tile.start = tile.len / 2;
+        self.work.tiles += u64::from(tile.len > 0);
+        self.work.asked += tile.len as u64;
+    }
+
+    /// Joins the tiles to a tree, by the neighbour on the left or above whose depth is nearer.
+    fn hang(&mut self, volumes: &Volumes) {
+        let eye = volumes.screen.eye;
+        let depth = |tile: &Tile| volumes.screen.depth(tile.place(tile.start) - eye);
+        let mut before = None;
+        for index in 0..TILES {
+            if self.tiles[index].len == 0 {
+                continue;
+            }
+            let own = depth(&self.tiles[index]);
+            let left = (index % BLOCK_TILES > 0).then(|| index - 1);
+            let above = index.checked_sub(BLOCK_TILES);
+            let neighbours = [left, above].into_iter().flatten().filter(|&n| self.tiles[n].len > 0);
+            let parent = neighbours
+                .min_by(|&a, &b| {
+                    let gap = |n: usize| (depth(&self.tiles[n]) - own).abs();
+                    gap(a).total_cmp(&gap(b))
+                })
+                .or(before);
+            if parent.is_none() {
+                let tile = &self.tiles[index];
+                let seen = tile.seen(tile.start, eye);
+                self.start = Some(Start::new(tile.place(tile.start), seen, &volumes.light));
+            }
+            self.links[index].parent = parent.unwrap_or(index);
+            before = Some(index);
+        }
+    }
+
+    /// Counts all pixels. The first start's count is known.
+    #[inline(always)]
+    pub(super) fn count<S: Simd>(&mut self, simd: S, volumes: &Volumes, light: LightPoint) {
+        if self.start.is_none() {
+            return;
+        }
+        let mut sides = [0_u32; TILES];
+        if volumes.dense > 0 {
+            self.count_sides(simd, volumes, &mut sides);
+            self.count_links(simd, volumes, &mut sides);
+        }
+        let mut starts = [0; TILES];
+        for index in 0..TILES {
+            let tile = &self.tiles[index];
+            if tile.len == 0 {
+                continue;
+            }
+            let Link { parent, change } = self.links[index];
+            starts[index] = if parent == index { self.start_count } else { starts[parent] + change };
+            let at = [index % BLOCK_TILES * TILE, index / BLOCK_TILES * TILE];
+            let is_dense = volumes.dense == 0 || sides[index] > volumes.dense;
+            self.work.uniform += u64::from(sides[index] == 0 && !is_dense);
+            for i in 0..tile.len {
+                let lit = if is_dense || tile.close >> i & 1 == 1 {
+                    self.work.traced += 1;
+                    // The place is an f32 that was widened.
+                    !volumes.tree.is_occluded(tile.place(i).as_vec3(), light)
+                } else {
+                    starts[index] + tile.counts[i] as i32 == 0
+                };
+                let pixel = tile.pixel[i] as usize;
+                self.lit[at[1] + pixel / TILE] |= u64::from(lit) << (at[0] + pixel % TILE);
+            }
+        }
+        self.tiles = Vec::new();
+    }
+
+    /// What the sides change.
+    #[inline(always)]
+    fn count_sides<S: Simd>(&mut self, simd: S, volumes: &Volumes, counted: &mut [u32; TILES]) {
+        let mut bounds = [const { BoxGroup::EMPTY }; TILES / LANES];
+        let mut chords = [const { BoxGroup::EMPTY }; TILES / LANES];
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for index in 0..TILES {
+            let tile = &self.tiles[index];
+            if tile.len == 0 {
+                continue;
+            }
+            let places = (0..tile.len).map(|i| tile.place(i));
+            let (min, max) =
+                places.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)));
+            (low, high) = (low.min(min), high.max(max));
+            bounds[index / LANES].set(index % LANES, min, max);
+            let parent = self.links[index].parent;
+            if parent != index {
+                let (a, b) = (tile.place(tile.start), self.tiles[parent].place(self.tiles[parent].start));
+                chords[index / LANES].set(index % LANES, a.min(b), a.max(b));
+            }
+        }
+        let (center, half) = ((low + high) * 0.5, (high - low) * 0.5);
+        for (group, side) in volumes.sides.iter().enumerate() {
+            let mut found = side.may_cross_box(simd, center, half);
+            while found != 0 {
+                let lane = found.trailing_zeros() as usize;
+                found &= found - 1;
+                let edge = &volumes.edges[group * LANES + lane];
+                for row in 0..TILES / LANES {
+                    let mut tiles = side.may_cross_boxes(simd, lane, &bounds[row]);
+                    while tiles != 0 {
+                        let index = row * LANES + tiles.trailing_zeros() as usize;
+                        tiles &= tiles - 1;
+                        counted[index] += 1;
+                        if counted[index] <= volumes.dense {
+                            self.tiles[index].add_side(simd, edge, &volumes.light);
+                            self.work.pairs += 1;
+                        }
+                    }
+                    let mut tiles = side.may_cross_boxes(simd, lane, &chords[row]);
+                    while tiles != 0 {
+                        let index = row * LANES + tiles.trailing_zeros() as usize;
+                        tiles &= tiles - 1;
+                        let (from, to) = self.chord(index);
+                        let q = to - from;
+                        let side = SideFromApex::new(edge, &volumes.light, from);
+                        let plane = edge.plane(&volumes.light);
+                        let begins = edge.is_outside(plane, from);
+                        let ends = edge.is_outside(plane, to);
+                        let beyond = side.edge.dot(q) >= 0.0;
+                        self.links[index].change +=
+                            edge.multiplicity * crossing(&side, q, beyond, begins, ends);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The ends of the chord from a tile's parent's start to its own.
+    #[inline(always)]
+    fn chord(&self, index: usize) -> (DVec3, DVec3) {
+        let (parent, own) = (&self.tiles[self.links[index].parent], &self.tiles[index]);
+        (parent.place(parent.start), own.place(own.start))
+    }
+
+    /// What the silhouette's edges on the screen link.
+    #[inline(always)]
+    fn count_links<S: Simd>(&mut self, simd: S, volumes: &Volumes, counted: &mut [u32; TILES]) {
+        let eye = volumes.screen.eye;
+        let step = f64::from(SnappedView::STEPS);
+        let reach = (TILE - 1) as f64 * step;
+        let depth = self.tiles.iter().map(|tile| tile.depth).fold(f64::NEG_INFINITY, f64::max);
+        for (outline, edge) in volumes.outlines.iter().zip(&volumes.edges) {
+            if !outline.may_pass(self.min, self.max, depth) {
+                continue;
+            }
+            for index in 0..TILES {
+                let tile = &self.tiles[index];
+                if tile.len == 0 {
+                    continue;
+                }
+                let (min, max) = (tile.corner, [tile.corner[0] + reach, tile.corner[1] + reach]);
+                let own_depth = tile.depth;
+                let parent = self.links[index].parent;
+                if parent != index {
+                    let from = self.tiles[parent].seen(self.tiles[parent].start, eye);
+                    let to = tile.seen(tile.start, eye);
+                    let least = [from.center[0].min(to.center[0]), from.center[1].min(to.center[1])];
+                    let greatest = [from.center[0].max(to.center[0]), from.center[1].max(to.center[1])];
+                    if outline.may_pass(least, greatest, own_depth.max(self.tiles[parent].depth)) {
+                        let (begin, end) = self.chord(index);
+                        let beyond = (edge.a - begin).cross(edge.b - begin).dot(end - begin) >= 0.0;
+                        self.links[index].change +=
+                            edge.multiplicity * outline.link(edge, eye, &from, &to, beyond);
+                    }
+                }
+                if outline.may_pass(min, max, own_depth) {
+                    counted[index] += 1;
+                    if counted[index] <= volumes.dense {
+                        self.tiles[index].add_link(simd, edge, outline, eye);
+                        self.work.pairs += 1;
+                    }
+                }
+            }
+        }
+    }
+}
+
+const _: () = assert!(PIXELS <= u8::MAX as usize + 1 && BLOCK == u64::BITS as usize);

@@ -1,0 +1,160 @@
+//! The CPU path: hierarchical counting.
+//!
+//! The image is cut into blocks of 64 × 64 pixels and these into tiles of 8 × 8. Within a tile the count changes only
+//! where a side passes through the box around what the tile sees, or where a silhouette edge passes before it
+//! ([`crate::outline`]). A tile with neither takes one count for all its pixels. Tiles are joined by chords between one
+//! pixel of each, and the first tile of a block is counted from the eye or from infinity ([`crate::volumes`]). So work
+//! grows with the number of silhouette edges and the length of the shadows' outlines, not with the area of the sides.
+//!
+//! A few pixels are not counted but traced: those in tiles of very many sides, where rays cost less; those closer than
+//! 1/256 pixel to a silhouette edge; those behind a caster that the near plane cut; and those whose position lies beside
+//! the triangle it was found on. The rasteriser may take a triangle for seen up to 2⁻⁹ pixel beside
+//! it; the position, on its plane, is then on no surface, perhaps behind a neighbour's, and what lies between the eye and
+//! it is not known.
+//!
+//! After Aila and Akenine-Möller, *A hierarchical shadow volume algorithm* (2004), which tests a tile's whole depth range
+//! and counts non-boundary tiles at one pixel each by rasterising all sides there.
+
+mod block;
+pub mod planar;
+mod tile;
+
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
+use scene_core::light::LightPoint;
+use scene_core::{GBuffer, Light, Report, Scene, VisibilityImage};
+
+use crate::volumes::Volumes;
+use block::Block;
+
+/// Pixels a side of a tile.
+pub const TILE: usize = 8;
+/// Tiles a side of a block.
+pub const BLOCK_TILES: usize = 8;
+/// Pixels a side of a block: the bits of one word.
+pub const BLOCK: usize = TILE * BLOCK_TILES;
+
+/// What counting cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Tiles with a pixel whose count was asked for.
+    pub tiles: u64,
+    /// Those that took one count for all pixels.
+    pub uniform: u64,
+    /// Pixels whose count was asked for.
+    pub asked: u64,
+    /// Seen pixels of receivers that the light cannot reach: it is behind them, or they are outside its cone.
+    pub unreached: u64,
+    /// Pixels that a ray decided.
+    pub traced: u64,
+    /// Pairs of a side and a tile that were counted pixel by pixel.
+    pub pairs: u64,
+}
+
+/// Which pixels' visibility is a question, and where they are.
+#[derive(Clone, Copy, Debug)]
+pub struct Receivers<'a> {
+    /// Geometry.
+    pub scene: &'a Scene,
+    /// What is seen.
+    pub gbuffer: &'a GBuffer,
+    /// The light.
+    pub light: &'a Light,
+    /// Largest coordinate of the scene.
+    pub magnitude: f32,
+}
+
+/// What is known of a pixel before any counting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// It sees nothing.
+    Nothing,
+    /// Its object does not receive shadows.
+    Lit,
+    /// The light is behind the surface or does not send there.
+    Dark,
+    /// It depends on the casters.
+    Yes,
+}
+
+impl Receivers<'_> {
+    /// What is known of a pixel.
+    #[inline]
+    pub fn ask(&self, pixel: usize) -> Asked {
+        let gbuffer = self.gbuffer;
+        if !gbuffer.is_seen(pixel) {
+            return Asked::Nothing;
+        }
+        if !self.scene.objects()[gbuffer.object[pixel] as usize].flags.receives {
+            return Asked::Lit;
+        }
+        let (position, normal) = (gbuffer.position[pixel], gbuffer.normal[pixel]);
+        let height = match self.light.center() {
+            LightPoint::At(place) => normal.dot(place - position),
+            LightPoint::Towards(direction) => normal.dot(direction),
+        };
+        if height > 0.0 && self.light.reaches(position) { Asked::Yes } else { Asked::Dark }
+    }
+}
+
+/// Fills `visibility`, of the G-buffer's size: V where a surface is seen, NaN elsewhere.
+pub fn shade(
+    volumes: &Volumes,
+    receivers: &Receivers<'_>,
+    report: &mut Report,
+    visibility: &mut VisibilityImage,
+) -> Work {
+    let (width, height) = (receivers.gbuffer.width as usize, receivers.gbuffer.height as usize);
+    let (columns, rows) = (width.div_ceil(BLOCK), height.div_ceil(BLOCK));
+    if columns * rows == 0 {
+        return Work::default();
+    }
+    let level = Level::new();
+    let mut blocks: Vec<Block> = report.time("shade.tiles", |_| {
+        let blocks = (0..columns * rows).into_par_iter();
+        blocks
+            .map(|index| {
+                let corner = [index % columns * BLOCK, index / columns * BLOCK];
+                Block::new(volumes, receivers, corner)
+            })
+            .collect()
+    });
+    report.time("shade.starts", |_| {
+        let starts: Vec<_> = blocks.iter().filter_map(|block| block.start).collect();
+        let mut counts = vec![0; starts.len()];
+        volumes.count_starts(&starts, &mut counts);
+        let with_start = blocks.iter_mut().filter(|block| block.start.is_some());
+        with_start.zip(counts).for_each(|(block, count)| block.start_count = count);
+    });
+    report.time("shade.count", |_| {
+        blocks.par_iter_mut().for_each(|block| {
+            dispatch!(level, simd => block.count(simd, volumes, receivers.light.center()));
+        });
+    });
+    let mut work = Work::default();
+    for block in &blocks {
+        work.tiles += block.work.tiles;
+        work.uniform += block.work.uniform;
+        work.asked += block.work.asked;
+        work.unreached += block.work.unreached;
+        work.traced += block.work.traced;
+        work.pairs += block.work.pairs;
+    }
+    report.time("shade.write", |_| {
+        visibility.values.par_chunks_mut(width).enumerate().for_each(|(y, values)| {
+            for (x, value) in values.iter_mut().enumerate() {
+                let block = &blocks[y / BLOCK * columns + x / BLOCK];
+                let is_lit = block.lit[y % BLOCK] >> (x % BLOCK) & 1 == 1;
+                let seen = receivers.gbuffer.is_seen(y * width + x);
+                *value = if !seen {
+                    f32::NAN
+                } else if is_lit {
+                    1.0
+                } else {
+                    0.0
+                };
+            }
+        });
+    });
+    work
+}

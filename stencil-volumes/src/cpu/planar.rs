@@ -1,0 +1,71 @@
+//! The CPU path of planar shadows: a drawing a receiver, kept where the receiver itself is seen.
+
+use glam::Mat4;
+use rayon::prelude::*;
+use scene_core::raster::{DepthMap, DepthOptions, RasterScratch, render_depth_into};
+use scene_core::{Camera, Report, VisibilityImage};
+
+use super::{Asked, Receivers};
+use crate::crossing::HomogeneousLight;
+use crate::planar::{Clipped, Receiver, clip_from_caster};
+
+/// Fills `visibility`: V where a surface is seen, NaN elsewhere. Only `flat` receivers show shadows. Those that nobody
+/// sees are left out if `skip`.
+pub fn shade(
+    flat: &[Receiver],
+    receivers: &Receivers<'_>,
+    camera: &Camera,
+    skip: bool,
+    report: &mut Report,
+    visibility: &mut VisibilityImage,
+) {
+    let (scene, gbuffer) = (receivers.scene, receivers.gbuffer);
+    let asked: Vec<Asked> = report.time("shade.ask", |_| {
+        (0..gbuffer.pixel_count())
+            .into_par_iter()
+            .with_min_len(4096)
+            .map(|pixel| receivers.ask(pixel))
+            .collect()
+    });
+    visibility.values.par_iter_mut().zip(&asked).with_min_len(4096).for_each(|(value, asked)| {
+        *value = match asked {
+            Asked::Nothing => f32::NAN,
+            Asked::Dark => 0.0,
+            Asked::Lit | Asked::Yes => 1.0,
+        };
+    });
+    let mut seen = vec![false; scene.objects().len()];
+    for (object, asked) in gbuffer.object.iter().zip(&asked) {
+        if *asked == Asked::Yes {
+            seen[*object as usize] = true;
+        }
+    }
+    let light = HomogeneousLight::from(receivers.light.center());
+    let mut scratch = RasterScratch::new();
+    let mut stencil = DepthMap { width: gbuffer.width, height: gbuffer.height, depth: Vec::new() };
+    let mut unseen = 0;
+    for receiver in flat {
+        if skip && !seen[receiver.object as usize] {
+            unseen += 1;
+            continue;
+        }
+        let casters = report.time("shade.clip", |_| Clipped::new(scene, receiver, &light));
+        let clip = clip_from_caster(receiver, &light, camera).as_mat4();
+        for (scene, triangles) in [(scene, Some(&casters.whole[..])), (&casters.cut, None)] {
+            if triangles.map_or(scene.triangles().is_empty(), <[_]>::is_empty) || clip == Mat4::ZERO {
+                continue;
+            }
+            report.time("shade.stencil", |_| {
+                let options = DepthOptions { triangles, ..Default::default() };
+                render_depth_into(scene, clip, &options, &mut scratch, &mut stencil);
+                let pixels = visibility.values.par_iter_mut().zip(&stencil.depth).zip(&gbuffer.object);
+                pixels.zip(&asked).with_min_len(4096).for_each(|(((value, &depth), &object), &asked)| {
+                    if depth > 0.0 && object == receiver.object && asked == Asked::Yes {
+                        *value = 0.0;
+                    }
+                });
+            });
+        }
+    }
+    report.skip("receivers nobody sees", unseen);
+}

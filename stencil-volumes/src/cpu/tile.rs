@@ -1,0 +1,183 @@
+//! Counting the pixels of one tile: the innermost loops.
+
+use fearless_simd::{Select, Simd, SimdBase, SimdMask, f64x8, mask64x8};
+use glam::DVec3;
+
+use super::TILE;
+use crate::bounds::LANES;
+use crate::crossing::{Edge, HomogeneousLight, SideFromApex};
+use crate::outline::{CLOSE, ScreenEdge, SeenPoint};
+
+/// Pixels of a tile.
+pub(super) const PIXELS: usize = TILE * TILE;
+
+/// The asked pixels of a tile, packed to the front.
+#[derive(Clone, Debug)]
+pub(super) struct Tile {
+    /// How many there are.
+    pub(super) len: usize,
+    /// Places, one array an axis.
+    pub(super) place: [[f64; PIXELS]; 3],
+    /// Their centres in steps, one array an axis.
+    pub(super) center: [[f64; PIXELS]; 2],
+    /// Which pixel of the tile each is, row by row.
+    pub(super) pixel: [u8; PIXELS],
+    /// Which of them stands for the tile.
+    pub(super) start: usize,
+    /// Faces between each and the light, less those of the start.
+    pub(super) counts: [f64; PIXELS],
+    /// Bits of those that are so close to an edge that they are traced.
+    pub(super) close: u64,
+    /// Centre of the tile's first pixel, in steps.
+    pub(super) corner: [f64; 2],
+    /// Greatest depth.
+    pub(super) depth: f64,
+}
+
+impl Tile {
+    pub(super) const EMPTY: Self = Self {
+        len: 0,
+        place: [[0.0; PIXELS]; 3],
+        center: [[0.0; PIXELS]; 2],
+        pixel: [0; PIXELS],
+        start: 0,
+        counts: [0.0; PIXELS],
+        close: 0,
+        corner: [0.0; 2],
+        depth: f64::NEG_INFINITY,
+    };
+
+    #[inline(always)]
+    pub(super) fn place(&self, index: usize) -> DVec3 {
+        DVec3::new(self.place[0][index], self.place[1][index], self.place[2][index])
+    }
+
+    /// Adds an asked pixel; there is room for all of a tile's.
+    pub(super) fn push(&mut self, pixel: usize, place: [f64; 3], depth: f64) {
+        const STEPS: f64 = scene_core::raster::SnappedView::STEPS as f64;
+        let at = self.len;
+        for (axis, coordinate) in self.place.iter_mut().zip(place) {
+            axis[at] = coordinate;
+        }
+        self.center[0][at] = self.corner[0] + (pixel % TILE) as f64 * STEPS;
+        self.center[1][at] = self.corner[1] + (pixel / TILE) as f64 * STEPS;
+        self.pixel[at] = pixel as u8;
+        self.depth = self.depth.max(depth);
+        self.len += 1;
+    }
+
+    /// An asked pixel as seen from the eye.
+    #[inline(always)]
+    pub(super) fn seen(&self, index: usize, eye: DVec3) -> SeenPoint {
+        SeenPoint {
+            center: [self.center[0][index], self.center[1][index]],
+            from_eye: self.place(index) - eye,
+        }
+    }
+
+    /// Eight values of an array.
+    #[inline(always)]
+    fn load<S: Simd>(simd: S, values: &[f64; PIXELS], at: usize) -> f64x8<S> {
+        f64x8::from_slice(simd, &values[at..at + LANES])
+    }
+
+    /// Where `add` the multiplicity is added, where `sub` it is taken off.
+    #[inline(always)]
+    fn book<S: Simd>(&mut self, simd: S, at: usize, multiplicity: i32, add: mask64x8<S>, sub: mask64x8<S>) {
+        let (zero, m) = (f64x8::splat(simd, 0.0), f64x8::splat(simd, f64::from(multiplicity)));
+        let counts = Self::load(simd, &self.counts, at) + add.select(m, zero) - sub.select(m, zero);
+        counts.store_slice(&mut self.counts[at..at + LANES]);
+    }
+
+    /// Adds what the chords from the start to every pixel cross of a side: [`crate::crossing::crossing`] for each.
+    #[inline(always)]
+    pub(super) fn add_side<S: Simd>(&mut self, simd: S, edge: &Edge, light: &HomogeneousLight) {
+        let apex = self.place(self.start);
+        let side = SideFromApex::new(edge, light, apex);
+        let plane = edge.plane(light);
+        let begins = edge.is_outside(plane, apex);
+        // What lies past the last pixel is zero, and nobody reads its count.
+        for at in (0..self.len).step_by(LANES) {
+            let place = [
+                Self::load(simd, &self.place[0], at),
+                Self::load(simd, &self.place[1], at),
+                Self::load(simd, &self.place[2], at),
+            ];
+            let ends = dot_from(simd, plane, place, edge.a).simd_ge(0.0);
+            // Nothing is crossed by a chord whose ends lie on one side.
+            let changes = if begins { !ends } else { ends };
+            if !changes.any_true() {
+                continue;
+            }
+            let along_a = dot_from(simd, side.along_a, place, apex).simd_ge(0.0);
+            let along_b = dot_from(simd, side.along_b, place, apex).simd_ge(0.0);
+            let beyond = dot_from(simd, side.edge, place, apex).simd_ge(0.0);
+            if begins {
+                let enters = changes & !along_a & along_b & beyond;
+                self.book(simd, at, edge.multiplicity, enters, enters ^ enters);
+            } else {
+                let leaves = changes & along_a & !along_b & !beyond;
+                self.book(simd, at, edge.multiplicity, leaves ^ leaves, leaves);
+            }
+        }
+    }
+
+    /// Adds what the loops over the start and every pixel link of an edge on the screen: [`ScreenEdge::link`] for each.
+    #[inline(always)]
+    pub(super) fn add_link<S: Simd>(&mut self, simd: S, edge: &Edge, outline: &ScreenEdge, eye: DVec3) {
+        let apex = self.place(self.start);
+        let towards = (edge.a - apex).cross(edge.b - apex);
+        let from = self.seen(self.start, eye);
+        let Some([a, b]) = outline.ends() else {
+            for i in 0..self.len {
+                let to = self.seen(i, eye);
+                let beyond = towards.dot(self.place(i) - apex) >= 0.0;
+                self.counts[i] += f64::from(edge.multiplicity * outline.link(edge, eye, &from, &to, beyond));
+            }
+            return;
+        };
+        let from_right = outline.is_right(edge, eye, &from);
+        let owned = crate::outline::owns(a, b);
+        let [fx, fy] = from.center;
+        for at in (0..self.len).step_by(LANES) {
+            let (x, y) = (Self::load(simd, &self.center[0], at), Self::load(simd, &self.center[1], at));
+            // Integers below 2⁵³: exact in any order.
+            let value = (y - a[1]) * (b[0] - a[0]) - (x - a[0]) * (b[1] - a[1]);
+            let reach = ((b[0] - a[0]).abs() + (b[1] - a[1]).abs()).max(1.0) * CLOSE;
+            let near = value.abs().simd_le(reach)
+                & x.simd_ge(a[0].min(b[0]) - CLOSE)
+                & x.simd_le(a[0].max(b[0]) + CLOSE)
+                & y.simd_ge(a[1].min(b[1]) - CLOSE)
+                & y.simd_le(a[1].max(b[1]) + CLOSE);
+            self.close |= near.to_bitmask() << at;
+            let right = if owned { value.simd_ge(0.0) } else { value.simd_gt(0.0) };
+            let other = if from_right { !right } else { right };
+            if !other.any_true() {
+                continue;
+            }
+            let place = [
+                Self::load(simd, &self.place[0], at),
+                Self::load(simd, &self.place[1], at),
+                Self::load(simd, &self.place[2], at),
+            ];
+            let beyond = dot_from(simd, towards, place, apex).simd_ge(0.0);
+            let passes = other & if from_right { beyond } else { !beyond };
+            let (dx, dy) = (x - fx, y - fy);
+            let chord_owns = dy.simd_lt(0.0) | (dy.simd_eq(0.0) & dx.simd_gt(0.0));
+            let of_a = dx * (a[1] - fy) - dy * (a[0] - fx);
+            let of_b = dx * (b[1] - fy) - dy * (b[0] - fx);
+            let a_right = of_a.simd_gt(0.0) | (of_a.simd_eq(0.0) & !chord_owns);
+            let b_right = of_b.simd_gt(0.0) | (of_b.simd_eq(0.0) & !chord_owns);
+            self.book(simd, at, edge.multiplicity, passes & a_right & !b_right, passes & !a_right & b_right);
+        }
+    }
+}
+
+/// v · (place − origin), term by term as [`DVec3::dot`] adds them: a sign is the same wherever it is asked for.
+#[inline(always)]
+fn dot_from<S: Simd>(simd: S, v: DVec3, place: [f64x8<S>; 3], origin: DVec3) -> f64x8<S> {
+    let x = (place[0] - origin.x) * f64x8::splat(simd, v.x);
+    let y = (place[1] - origin.y) * f64x8::splat(simd, v.y);
+    let z = (place[2] - origin.z) * f64x8::splat(simd, v.z);
+    x + y + z
+}

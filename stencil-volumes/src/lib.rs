@@ -1,0 +1,131 @@
+#![doc = include_str!("../README.md")]
+
+pub mod bounds;
+mod casters;
+pub mod cpu;
+pub mod crossing;
+mod error;
+pub mod outline;
+mod params;
+pub mod planar;
+pub mod silhouette;
+mod technique;
+pub mod volumes;
+
+use glam::Vec3;
+use rayon::prelude::*;
+use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
+
+pub use casters::{Casters, near_casters};
+use cpu::Receivers;
+use crossing::faces_between;
+pub use error::VolumeError;
+pub use params::{Count, Variant, VolumeParams};
+use planar::{Receiver, planar_receivers};
+pub use technique::Factory;
+use volumes::Volumes;
+
+/// The technique: settings, from which any number of lights can be prepared.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StencilVolumes {
+    params: VolumeParams,
+}
+
+/// What a variant prepares.
+#[derive(Debug)]
+enum Prepared {
+    Planar(Vec<Receiver>),
+    Volumes(Box<Volumes>),
+}
+
+/// One light's shadows for one camera, borrowing the scene.
+#[derive(Debug)]
+pub struct PreparedVolumes<'a> {
+    scene: &'a Scene,
+    light: Light,
+    camera: Camera,
+    skip: bool,
+    prepared: Prepared,
+}
+
+impl StencilVolumes {
+    /// A technique with these settings.
+    pub fn new(params: VolumeParams) -> Self {
+        Self { params }
+    }
+
+    /// Prepares `light` for what `camera` sees. `casters` is made once a scene and kept from frame to frame.
+    pub fn prepare<'a>(
+        &self,
+        casters: &Casters<'a>,
+        light: &Light,
+        camera: &Camera,
+    ) -> (PreparedVolumes<'a>, Report) {
+        let mut report = Report::default();
+        let VolumeParams { variant, skip, .. } = self.params;
+        let scene = casters.scene;
+        let prepared = match variant {
+            Variant::Planar => {
+                Prepared::Planar(report.time("prepare.receivers", |_| planar_receivers(scene, light)))
+            }
+            Variant::Volumes => {
+                let volumes = Volumes::new(casters, light, camera, &self.params, &mut report);
+                report.bytes = (volumes.bytes() + casters.bytes()) as u64;
+                Prepared::Volumes(Box::new(volumes))
+            }
+        };
+        (PreparedVolumes { scene, light: *light, camera: *camera, skip, prepared }, report)
+    }
+}
+
+impl PreparedVolumes<'_> {
+    /// The volumes; `None` of the variant `planar`.
+    pub fn volumes(&self) -> Option<&Volumes> {
+        match &self.prepared {
+            Prepared::Volumes(volumes) => Some(volumes),
+            Prepared::Planar(_) => None,
+        }
+    }
+
+    /// Fills `visibility`, which must have the G-buffer's size: V where a surface is seen, NaN elsewhere. The
+    /// G-buffer must be the camera's.
+    pub fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Report {
+        let mut report = Report::default();
+        let magnitude = self.scene.bounds().magnitude();
+        let receivers = Receivers { scene: self.scene, gbuffer, light: &self.light, magnitude };
+        match &self.prepared {
+            Prepared::Planar(flat) => {
+                cpu::planar::shade(flat, &receivers, &self.camera, self.skip, &mut report, visibility);
+            }
+            Prepared::Volumes(volumes) => {
+                let work = cpu::shade(volumes, &receivers, &mut report, visibility);
+                report.skip("pixels the light cannot reach", work.unreached);
+                report.skip("tiles of one count", work.uniform);
+            }
+        }
+        report
+    }
+
+    /// V at free points, by counting the faces between each and the light one by one; NaN for a point that is not
+    /// finite. Takes time in proportion to points times triangles. The slices must be of equal length: what the longer
+    /// one has more is left alone.
+    pub fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Report {
+        let mut report = Report::default();
+        let scene = self.scene;
+        let casts = |o: &&scene_core::geometry::Object| o.flags.casts;
+        report.time("shade.points", |_| {
+            visibility.par_iter_mut().zip(points).for_each(|(v, &point)| {
+                let triangles = scene.objects().iter().filter(casts).flat_map(|o| o.triangles.clone());
+                *v = if !point.is_finite() {
+                    f32::NAN
+                } else if !self.light.reaches(point) {
+                    0.0
+                } else {
+                    let faces = triangles.map(|t| scene.corners(t));
+                    f32::from(u8::from(faces_between(faces, point, self.light.center()) == 0))
+                };
+            });
+        });
+        report
+    }
+}

@@ -1,0 +1,116 @@
+//! The trait's implementation, nothing else.
+
+use glam::Vec3;
+use scene_core::technique::{
+    Capability, Description, Params, PreparedShadow, Setting, SettingsError, ShadowQuery, ShadowTechnique,
+    Support, TechniqueError, TechniqueFactory,
+};
+use scene_core::{GBuffer, Report, VisibilityImage};
+
+use crate::{Casters, PreparedVolumes, StencilVolumes, Variant, VolumeError, VolumeParams};
+
+impl ShadowTechnique for StencilVolumes {
+    fn name(&self) -> &'static str {
+        VolumeParams::TECHNIQUE
+    }
+
+    fn describe(&self) -> Description {
+        const CENTRE: Support = Support::Approximate("an extended light is taken for its centre");
+        let planar = self.params.variant == Variant::Planar;
+        let hard =
+            if planar { Support::Approximate("only flat objects show shadows") } else { Support::Exact };
+        let support = |capability| match capability {
+            Capability::DirectionalLight | Capability::PointLight | Capability::SpotLight => hard,
+            Capability::Sun | Capability::SphereLight | Capability::RectLight | Capability::DiskLight => {
+                CENTRE
+            }
+            Capability::AlphaMask => Support::Unsupported("the outline of a mask's holes has no edges"),
+            Capability::TriangleSoup => hard,
+            Capability::FreePoints => Support::Exact,
+            Capability::Gpu => Support::Unsupported("the CPU path is the only one so far"),
+        };
+        Description {
+            summary: SUMMARY,
+            support: Capability::ALL
+                .into_iter()
+                .map(|capability| (capability, support(capability)))
+                .collect(),
+        }
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        self.params.to_json()
+    }
+
+    fn prepare<'a>(
+        &self,
+        query: &ShadowQuery<'a>,
+    ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError> {
+        let mut report = Report::default();
+        let casters = report.time("prepare.edges", |_| Casters::new(query.scene));
+        let casters = casters.map_err(|error| match error {
+            VolumeError::Masked { .. } => TechniqueError::Unsupported {
+                technique: VolumeParams::TECHNIQUE,
+                input: "casters with cut-out masks".to_owned(),
+                why: error.to_string(),
+            },
+            VolumeError::Topology(_) => TechniqueError::Other(Box::new(error)),
+        })?;
+        let (prepared, rest) = StencilVolumes::prepare(self, &casters, query.light, query.camera);
+        report.merge(&rest);
+        Ok((Box::new(prepared), report))
+    }
+}
+
+impl PreparedShadow for PreparedVolumes<'_> {
+    fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError> {
+        if visibility.values.len() != gbuffer.pixel_count() {
+            let (expected, got) = (gbuffer.pixel_count(), visibility.values.len());
+            return Err(TechniqueError::OutputSize { expected, got });
+        }
+        Ok(PreparedVolumes::shade(self, gbuffer, visibility))
+    }
+
+    fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Result<Report, TechniqueError> {
+        if points.len() != visibility.len() {
+            return Err(TechniqueError::OutputSize { expected: points.len(), got: visibility.len() });
+        }
+        Ok(PreparedVolumes::visibility_at(self, points, visibility))
+    }
+
+    fn survives_camera(&self) -> bool {
+        false
+    }
+}
+
+const SUMMARY: &str = "shadow volumes from silhouettes: exact hard shadows on any triangle soup";
+
+/// Makes [`StencilVolumes`] from settings given as text.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Factory;
+
+impl TechniqueFactory for Factory {
+    fn name(&self) -> &'static str {
+        VolumeParams::TECHNIQUE
+    }
+
+    fn summary(&self) -> &'static str {
+        SUMMARY
+    }
+
+    fn settings(&self) -> &'static [Setting] {
+        VolumeParams::SETTINGS
+    }
+
+    fn presets(&self) -> Vec<&'static str> {
+        VolumeParams::PRESETS.iter().map(|preset| preset.name).collect()
+    }
+
+    fn create(
+        &self,
+        preset: Option<&str>,
+        overrides: &[(String, String)],
+    ) -> Result<Box<dyn ShadowTechnique>, SettingsError> {
+        Ok(Box::new(StencilVolumes::new(VolumeParams::from_overrides(preset, overrides)?)))
+    }
+}

@@ -1,0 +1,69 @@
+//! Leaving out what cannot matter never changes an image, bit for bit, and is counted.
+
+use glam::{Affine3A, Vec3};
+use gnomon_stencil_volumes::{Casters, StencilVolumes, Variant, VolumeParams};
+use scene_core::geometry::ObjectFlags;
+use scene_core::{Camera, Light, Report, Scene, TriangleMesh, VisibilityImage, raster, scenes};
+
+/// Images with skipping on and off; the reports of the first.
+fn compare(scene: &Scene, light: &Light, camera: &Camera, variant: Variant) -> Report {
+    let gbuffer = raster::render_gbuffer(scene, camera);
+    let casters = Casters::new(scene).expect("no masks");
+    let mut kept = Report::default();
+    let images = [true, false].map(|skip| {
+        let technique = StencilVolumes::new(VolumeParams { variant, skip, ..Default::default() });
+        let (prepared, mut report) = technique.prepare(&casters, light, camera);
+        let mut image = VisibilityImage::new(camera.width, camera.height);
+        report.merge(&prepared.shade(&gbuffer, &mut image));
+        if skip {
+            kept = report;
+        }
+        image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
+    });
+    let wrong = images[0].iter().zip(&images[1]).filter(|(a, b)| a != b).count();
+    assert_eq!(wrong, 0, "{light:?}, {variant:?}");
+    kept
+}
+
+#[test]
+fn views_of_the_street() {
+    let setup = scenes::build("street", 0.0).expect("built in");
+    // Along the street and close to the ground: most of it is out of view.
+    let target = setup.camera.target + Vec3::new(3.0, 0.0, 1.0);
+    let camera = Camera { target, fov_y: 0.25, ..setup.camera.with_size(96, 64) };
+    let report = compare(&setup.scene, &setup.lights[0], &camera, Variant::Volumes);
+    assert!(report.skipped["caster triangles outside view"] > 0);
+    assert!(report.skipped["caps"] > 0);
+}
+
+#[test]
+fn a_caster_under_a_roof_is_left_out() {
+    let mut scene = Scene::new();
+    for (height, half) in [(0.0, 6.0), (2.0, 3.0), (1.0, 0.2)] {
+        let corner = |x: f32, z: f32| Vec3::new(x * half, height, z * half);
+        // One large triangle hides the small one under it.
+        let positions = vec![corner(-1.0, -1.0), corner(3.0, -1.0), corner(-1.0, 3.0)];
+        let mesh = TriangleMesh::new("triangle", positions, vec![[0, 1, 2]]);
+        scene.add(&mesh, Affine3A::IDENTITY, ObjectFlags::default()).expect("finite");
+    }
+    let camera = Camera {
+        eye: Vec3::new(0.0, 1.5, 7.0),
+        target: Vec3::Y * 0.5,
+        up: Vec3::Y,
+        fov_y: 0.9,
+        near: 0.01,
+        far: f32::INFINITY,
+        width: 160,
+        height: 120,
+    };
+    for light in [
+        Light::Point { position: Vec3::new(0.1, 5.0, 0.2) },
+        Light::Directional { direction: Vec3::new(0.1, -1.0, 0.05), angular_radius: 0.0 },
+    ] {
+        let report = compare(&scene, &light, &camera, Variant::Volumes);
+        assert_eq!(report.skipped["casters in another's shadow"], 1, "{light:?}");
+        assert!(report.skipped["tiles of one count"] > 100, "{light:?}");
+        let report = compare(&scene, &light, &camera, Variant::Planar);
+        assert!(report.skipped.contains_key("receivers nobody sees"));
+    }
+}
