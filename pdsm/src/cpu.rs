@@ -5,7 +5,9 @@ use std::ops::Range;
 use glam::Vec3;
 use gnomon_shadow_map::receiver_plane::view_tolerance;
 use rayon::prelude::*;
-use scene_core::raster::{DEPTH_POSITION_ERROR, DepthMap, DepthOptions, RasterScratch, render_depth_into};
+use scene_core::raster::{
+    DEPTH_POSITION_ERROR, DepthMap, DepthOptions, DepthRange, RasterScratch, render_depth_into,
+};
 use scene_core::{GBuffer, Light, Scene, VisibilityImage};
 
 use crate::crossings::Crossings;
@@ -46,7 +48,7 @@ pub fn collect_events(
     skip: bool,
 ) -> (Vec<EventStrips>, u64) {
     let size = layout.map_size();
-    let options = DepthOptions { triangles: Some(casters), ..Default::default() };
+    let options = DepthOptions { range: DepthRange::Clamp, triangles: Some(casters), ..Default::default() };
     let steps: Vec<_> = layout.steps().collect();
     let collector = || Collector {
         raster: RasterScratch::new(),
@@ -91,6 +93,11 @@ pub struct Lookup<'a> {
 /// snapping adds: how far the place whose depth a texel holds may be from the ray that reads it.
 const READ_DISTANCE: f32 = 0.5 + DEPTH_POSITION_ERROR;
 
+/// What t may be off, relative to |t| + |1 − t|, between a receiver and the map's point of the same place: with u = 2⁻²⁴
+/// the receiver's t is off by 3 u of F/z = 1 − t and u of t, the map's depth by 10 u of its own largest
+/// ([`scene_core::raster::depth_error`]), which is as much of 1 − t, and the event by 4 u of t. Together below 24 u.
+const T_ERROR: f32 = 24.0 / 16_777_216.0;
+
 impl Lookup<'_> {
     /// `shade.lookup` of one receiver with the unit normal on its lit side.
     ///
@@ -106,7 +113,8 @@ impl Lookup<'_> {
         let Some((window, at)) = self.locate(receiver) else { return 1.0 };
         let layout = &window.layout;
         let (slope, lift) = layout.plane_slope(receiver, normal, at.t);
-        let rounding = (self.tolerance + view_tolerance(depth)) * lift;
+        let rounding =
+            (self.tolerance + view_tolerance(depth)) * lift + T_ERROR * (at.t.abs() + (1.0 - at.t).abs());
         let before = at.t - READ_DISTANCE * slope.abs().element_sum() - rounding;
         if !before.is_finite() {
             // The plane holds the light's middle: half of the light is below it at best.

@@ -24,8 +24,17 @@ const MAX_TAN: f64 = 16.0;
 /// border (2⁻¹⁴ is a sixteenth of a texel at 1024).
 const MARGIN: f64 = 1.0 / 16_384.0;
 
-/// The nearest distance of a window's casters, as a share of the farthest: positions are not exact below it (2⁻²⁰).
-const NEAR_SHARE: f64 = 1.0 / 1_048_576.0;
+/// The smallest extent that a window is given, as a share of its distance from the axes' origin: positions are not exact
+/// below it (2⁻²⁰).
+const SMALLEST_SHARE: f64 = 1.0 / 1_048_576.0;
+
+/// Casters nearer to the light's plane than this share of the farthest point are taken to lie there, so that rays have
+/// an end to begin at: t = 1 − F/z has none at z = 0.
+const NEAR_SHARE: f64 = 1.0 / 1024.0;
+
+/// The window stands at this share of the farthest distance at least. A step of f32 in t is one of z²/F in z: nearer, far
+/// points would lose more than two bits.
+const FOCUS_SHARE: f64 = 0.25;
 
 /// How distance becomes t.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -345,15 +354,15 @@ impl Builder<'_> {
         let [_, far_receiver] = extent(&receivers);
         let farthest = far.max(far_receiver);
         let (near, focus) = if frame.is_parallel {
-            let pad = (far - near).max(farthest.abs().max(near.abs()) * NEAR_SHARE) * MARGIN;
+            let pad = (far - near).max(farthest.abs().max(near.abs()) * SMALLEST_SHARE) * MARGIN;
             (near - pad, 0.5 * (near + farthest))
         } else {
             if far.is_nan() || far <= 0.0 {
                 return None;
             }
-            let near = near.max(far * NEAR_SHARE) * (1.0 - MARGIN);
+            let near = near.max(farthest * NEAR_SHARE) * (1.0 - MARGIN);
             // The harmonic mean: |t| is equal at both ends, so that maps are shifted the least.
-            (near, 2.0 * near * farthest / (near + farthest))
+            (near, (2.0 * near * farthest / (near + farthest)).max(farthest * FOCUS_SHARE))
         };
         let far = if frame.is_parallel { far + (far - near) * MARGIN } else { far };
         let per_unit = if frame.is_parallel { 2.0 / (farthest - near) } else { 0.0 };
@@ -361,7 +370,7 @@ impl Builder<'_> {
         let reach = offsets.iter().fold(Rect::EMPTY, |sum, &a| sum.with(a, [DVec2::ZERO; 2]));
         let window = window(&frame, &casters, &receivers, focus, near, farthest, reach)?;
         let size = (window.max - window.min)
-            .max(DVec2::splat(window.max.abs().max(window.min.abs()).max_element() * NEAR_SHARE))
+            .max(DVec2::splat(window.max.abs().max(window.min.abs()).max_element() * SMALLEST_SHARE))
             .max(DVec2::splat(1e-30));
         let corner = window.min - size * MARGIN;
         let texels_per_unit = f64::from(self.map_size) / (size * (1.0 + 2.0 * MARGIN));

@@ -172,7 +172,7 @@ fn squares_are_as_computed_by_hand() {
 ///
 /// With n = (1.58, 0.50)/√2.7464 out of that side and d the point's distance from it, the line is where n·q = n·a − d·(k − 1),
 /// a an end of the edge, k = 5.487/1.65. Of the light, x from 2.13 to 3.43 and z from 2.27 to 3.32, the corner (2.13, 2.27) is the
-/// farthest beyond. If it is so by s, a triangle of legs s/n_x and s/n_z is cut off, less what lies past
+/// farthest beyond. If it is so by s, a triangle of legs `s/n_x` and `s/n_z` is cut off, less what lies past
 /// the light's far end in z, a triangle of the same shape. The ends of the edge's image lie beyond the light: from 0.7 along it
 /// from the origin of its direction, those are 2 and 2.7 away. The tall block is seen beside the light.
 #[test]

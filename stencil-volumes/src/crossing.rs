@@ -7,7 +7,7 @@
 //!
 //! > n_a = l × a′, n_b = l × b′, m = a′ × b′, D = l · m
 //!
-//! a point O + q is (−(n_b·q) a′ + (n_a·q) b′ + (m·q) l) / D. Let α = n_a·q, β = n_b·q, μ = m·q. The segment from O to
+//! a point O + q is `(−(n_b·q) a′ + (n_a·q) b′ + (m·q) l) / D`. Let `α = n_a·q`, `β = n_b·q`, μ = m·q. The segment from O to
 //! O + q crosses the side if and only if both ends lie on different sides of its plane and
 //!
 //! > α ≥ 0, β < 0, μ < 0 (D > 0), or α < 0, β ≥ 0, μ ≥ 0 (D < 0).

@@ -22,21 +22,39 @@ const MAX_BYTES: usize = 64 << 10;
 const PROJECT: Figure = Figure {
     file: "docs/compare.png",
     scene: "knot",
-    size: "280x210",
+    size: "220x165",
     techniques: &[],
     variants: false,
     left_out: &[],
 };
 
 /// Figures of technique crates, whose light their variants take. A crate that is not listed gets [`OTHERS`].
-const TECHNIQUES: [Figure; 1] = [Figure {
-    file: "shadow-map/figure.png",
-    scene: "ball",
-    size: "160x120",
-    techniques: &["shadow-map"],
-    variants: true,
-    left_out: &[],
-}];
+const TECHNIQUES: [Figure; 3] = [
+    Figure {
+        file: "shadow-map/figure.png",
+        scene: "ball",
+        size: "160x120",
+        techniques: &["shadow-map"],
+        variants: true,
+        left_out: &[],
+    },
+    Figure {
+        file: "psm/figure.png",
+        scene: "street",
+        size: "160x120",
+        techniques: &["psm"],
+        variants: true,
+        left_out: &[],
+    },
+    Figure {
+        file: "stencil-volumes/figure.png",
+        scene: "knot",
+        size: "200x150",
+        techniques: &["stencil-volumes"],
+        variants: true,
+        left_out: &[],
+    },
+];
 
 /// Scene and size of a technique crate's figure that has no row.
 const OTHERS: (&str, &str) = ("ball", "160x120");

@@ -288,7 +288,7 @@ impl Block {
             if !outline.may_pass(self.min, self.max, depth) {
                 continue;
             }
-            for index in 0..TILES {
+            for (index, counted) in counted.iter_mut().enumerate() {
                 let tile = &self.tiles[index];
                 if tile.len == 0 {
                     continue;
@@ -309,8 +309,8 @@ impl Block {
                     }
                 }
                 if outline.may_pass(min, max, own_depth) {
-                    counted[index] += 1;
-                    if counted[index] <= volumes.dense {
+                    *counted += 1;
+                    if *counted <= volumes.dense {
                         self.tiles[index].add_link(simd, edge, outline, eye);
                         self.work.pairs += 1;
                     }

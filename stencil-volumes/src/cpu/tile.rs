@@ -81,11 +81,11 @@ impl Tile {
         f64x8::from_slice(simd, &values[at..at + LANES])
     }
 
-    /// Where `add` the multiplicity is added, where `sub` it is taken off.
+    /// Adds the multiplicity where `passes`; one that passes the other way is negative.
     #[inline(always)]
-    fn book<S: Simd>(&mut self, simd: S, at: usize, multiplicity: i32, add: mask64x8<S>, sub: mask64x8<S>) {
+    fn book<S: Simd>(&mut self, simd: S, at: usize, multiplicity: i32, passes: mask64x8<S>) {
         let (zero, m) = (f64x8::splat(simd, 0.0), f64x8::splat(simd, f64::from(multiplicity)));
-        let counts = Self::load(simd, &self.counts, at) + add.select(m, zero) - sub.select(m, zero);
+        let counts = Self::load(simd, &self.counts, at) + passes.select(m, zero);
         counts.store_slice(&mut self.counts[at..at + LANES]);
     }
 
@@ -114,10 +114,10 @@ impl Tile {
             let beyond = dot_from(simd, side.edge, place, apex).simd_ge(0.0);
             if begins {
                 let enters = changes & !along_a & along_b & beyond;
-                self.book(simd, at, edge.multiplicity, enters, enters ^ enters);
+                self.book(simd, at, edge.multiplicity, enters);
             } else {
                 let leaves = changes & along_a & !along_b & !beyond;
-                self.book(simd, at, edge.multiplicity, leaves ^ leaves, leaves);
+                self.book(simd, at, -edge.multiplicity, leaves);
             }
         }
     }
@@ -168,7 +168,8 @@ impl Tile {
             let of_b = dx * (b[1] - fy) - dy * (b[0] - fx);
             let a_right = of_a.simd_gt(0.0) | (of_a.simd_eq(0.0) & !chord_owns);
             let b_right = of_b.simd_gt(0.0) | (of_b.simd_eq(0.0) & !chord_owns);
-            self.book(simd, at, edge.multiplicity, passes & a_right & !b_right, passes & !a_right & b_right);
+            self.book(simd, at, edge.multiplicity, passes & a_right & !b_right);
+            self.book(simd, at, -edge.multiplicity, passes & !a_right & b_right);
         }
     }
 }
