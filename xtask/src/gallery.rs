@@ -202,14 +202,14 @@ mod tests {
     #[test]
     fn every_technique_crate_has_a_figure() {
         let tree = tempfile::tempdir().unwrap();
-        for folder in ["shadow-map", "psm"] {
+        for folder in ["shadow-map", "pdsm"] {
             fs::create_dir_all(tree.path().join(folder)).unwrap();
         }
         let jobs = jobs(tree.path()).unwrap();
         let files: Vec<_> = jobs.iter().map(|job| job.file.display().to_string()).collect();
-        assert_eq!(files, ["docs/compare.png", "shadow-map/figure.png", "psm/figure.png"]);
+        assert_eq!(files, ["docs/compare.png", "shadow-map/figure.png", "pdsm/figure.png"]);
         let words = jobs[2].arguments.join(" ");
-        assert_eq!(words, "compare ball --size 160x120 --techniques psm --variants");
+        assert_eq!(words, "compare ball --size 160x120 --techniques pdsm --variants");
     }
 
     #[test]
