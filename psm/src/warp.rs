@@ -99,7 +99,7 @@ impl Window {
         !self.min.cmple(self.max).all()
     }
 
-    /// Grown by [`MARGIN`], and by as much of its coordinates where it has no extent.
+    /// Grown by a margin for rounding, and by as much of its coordinates where it has no extent.
     #[must_use]
     pub fn widened(self) -> Self {
         let largest = self.min.abs().max(self.max.abs()).max_element().max(f64::from(f32::MIN_POSITIVE));
