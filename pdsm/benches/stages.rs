@@ -20,7 +20,7 @@ use scene_core::reference::{ReferenceSettings, no_progress, reference};
 use scene_core::{SceneSetup, VisibilityImage, raster, relevance, scenes};
 
 fn setup() -> SceneSetup {
-    scenes::build("knot:triangles=200000", 0.0).expect("a built-in scene")
+    scenes::build("knot:sides=79", 0.0).expect("a built-in scene")
 }
 
 /// The knot alone, without its ground.

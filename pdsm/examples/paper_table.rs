@@ -11,7 +11,7 @@ use scene_core::{SceneSetup, VisibilityImage, io, raster, scenes};
 const ROWS: [(&str, u32, u32, Option<f64>); 4] = [
     ("cylinder", 64, 512, Some(30.0)),
     ("quads", 144, 512, Some(67.0)),
-    ("knot:triangles=200000", 64, 512, Some(33.0)),
+    ("knot:sides=79", 64, 512, Some(33.0)),
     ("park", 64, 1024, Some(161.0)),
 ];
 
