@@ -121,7 +121,7 @@ impl Lookup<'_> {
             return layout.share_above(receiver, normal);
         }
         let visibility = window.read(at.texel, before, slope, self.bilinear);
-        visibility.min(layout.share_above_if_cut(receiver, normal))
+        visibility.min(layout.share_above(receiver, normal))
     }
 
     /// V at a free point, which has no surface of its own.

@@ -146,6 +146,7 @@ impl Layout {
     }
 
     /// The share of the samples that lie above the plane through `point` with unit normal `normal`.
+    #[inline]
     pub fn share_above(&self, point: Vec3, normal: Vec3) -> f32 {
         let n = Vec3::from_array(self.axes.map(|axis| axis.dot(normal)));
         // N·(C + a − P) for a place, −N·(n + a) for a direction of travel.
@@ -153,20 +154,12 @@ impl Layout {
             Depth::Central { .. } => (1.0, normal.dot(self.origin - point)),
             Depth::Parallel { .. } => (-1.0, -n.z),
         };
+        // Mostly the plane does not cut the light.
+        if middle > n.truncate().abs().dot(self.reach) {
+            return 1.0;
+        }
         let above = self.offsets.iter().filter(|&&a| middle + sign * n.truncate().dot(a) > 0.0).count();
         above as f32 / self.offsets.len().max(1) as f32
-    }
-
-    /// [`share_above`](Self::share_above) where the plane cuts the light, else 1.
-    #[inline]
-    pub fn share_above_if_cut(&self, point: Vec3, normal: Vec3) -> f32 {
-        let n = Vec3::from_array(self.axes.map(|axis| axis.dot(normal)));
-        let middle = match self.depth {
-            Depth::Central { .. } => normal.dot(self.origin - point),
-            Depth::Parallel { .. } => -n.z,
-        };
-        let reach = n.truncate().abs().dot(self.reach);
-        if middle > reach { 1.0 } else { self.share_above(point, normal) }
     }
 
     /// The projection of the map of the sample with step `step`: a texel's x and y in clip space, and reversed depth.
