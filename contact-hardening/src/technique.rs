@@ -1,8 +1,8 @@
 //! The trait's implementation, nothing else.
 
 use scene_core::technique::{
-    Capability, Description, Params, PreparedShadow, Setting, SettingsError, ShadowQuery, ShadowTechnique,
-    Support, TechniqueError, TechniqueFactory,
+    Capability, Description, Params, PreparedShadow, ShadowQuery, ShadowTechnique, Support, TechniqueError,
+    TechniqueFromParams,
 };
 use scene_core::{Camera, GBuffer, Report, VisibilityImage};
 
@@ -78,28 +78,11 @@ const SUMMARY: &str = "hard shadows blurred in screen space, as wide as the ligh
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Factory;
 
-impl TechniqueFactory for Factory {
-    fn name(&self) -> &'static str {
-        ContactHardeningParams::TECHNIQUE
-    }
+impl TechniqueFromParams for Factory {
+    type Params = ContactHardeningParams;
+    const SUMMARY: &'static str = SUMMARY;
 
-    fn summary(&self) -> &'static str {
-        SUMMARY
-    }
-
-    fn settings(&self) -> &'static [Setting] {
-        ContactHardeningParams::SETTINGS
-    }
-
-    fn presets(&self) -> Vec<&'static str> {
-        ContactHardeningParams::PRESETS.iter().map(|preset| preset.name).collect()
-    }
-
-    fn create(
-        &self,
-        preset: Option<&str>,
-        overrides: &[(String, String)],
-    ) -> Result<Box<dyn ShadowTechnique>, SettingsError> {
-        Ok(Box::new(ContactHardening::new(ContactHardeningParams::from_overrides(preset, overrides)?)))
+    fn make(params: ContactHardeningParams) -> Box<dyn ShadowTechnique> {
+        Box::new(ContactHardening::new(params))
     }
 }

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 use scene_core::technique::{
-    Capability, Description, Params, PreparedShadow, Setting, SettingsError, ShadowQuery, ShadowTechnique,
-    Support, TechniqueError, TechniqueFactory,
+    Capability, Description, Params, PreparedShadow, ShadowQuery, ShadowTechnique, Support, TechniqueError,
+    TechniqueFromParams,
 };
 use scene_core::{GBuffer, Report, VisibilityImage};
 
@@ -76,28 +76,11 @@ const SUMMARY: &str =
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Factory;
 
-impl TechniqueFactory for Factory {
-    fn name(&self) -> &'static str {
-        PdsmParams::TECHNIQUE
-    }
+impl TechniqueFromParams for Factory {
+    type Params = PdsmParams;
+    const SUMMARY: &'static str = SUMMARY;
 
-    fn summary(&self) -> &'static str {
-        SUMMARY
-    }
-
-    fn settings(&self) -> &'static [Setting] {
-        PdsmParams::SETTINGS
-    }
-
-    fn presets(&self) -> Vec<&'static str> {
-        PdsmParams::PRESETS.iter().map(|preset| preset.name).collect()
-    }
-
-    fn create(
-        &self,
-        preset: Option<&str>,
-        overrides: &[(String, String)],
-    ) -> Result<Box<dyn ShadowTechnique>, SettingsError> {
-        Ok(Box::new(Pdsm::new(PdsmParams::from_overrides(preset, overrides)?)))
+    fn make(params: PdsmParams) -> Box<dyn ShadowTechnique> {
+        Box::new(Pdsm::new(params))
     }
 }

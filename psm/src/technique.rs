@@ -4,8 +4,8 @@ use std::sync::OnceLock;
 
 use glam::Vec3;
 use scene_core::technique::{
-    Capability, Description, Params, PreparedShadow, Setting, SettingsError, ShadowQuery, ShadowTechnique,
-    Support, TechniqueError, TechniqueFactory,
+    Capability, Description, Params, PreparedShadow, ShadowQuery, ShadowTechnique, Support, TechniqueError,
+    TechniqueFromParams,
 };
 use scene_core::{GBuffer, Report, VisibilityImage, raster};
 
@@ -105,28 +105,11 @@ const SUMMARY: &str =
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Factory;
 
-impl TechniqueFactory for Factory {
-    fn name(&self) -> &'static str {
-        PsmParams::TECHNIQUE
-    }
+impl TechniqueFromParams for Factory {
+    type Params = PsmParams;
+    const SUMMARY: &'static str = SUMMARY;
 
-    fn summary(&self) -> &'static str {
-        SUMMARY
-    }
-
-    fn settings(&self) -> &'static [Setting] {
-        PsmParams::SETTINGS
-    }
-
-    fn presets(&self) -> Vec<&'static str> {
-        PsmParams::PRESETS.iter().map(|preset| preset.name).collect()
-    }
-
-    fn create(
-        &self,
-        preset: Option<&str>,
-        overrides: &[(String, String)],
-    ) -> Result<Box<dyn ShadowTechnique>, SettingsError> {
-        Ok(Box::new(Psm::new(PsmParams::from_overrides(preset, overrides)?)))
+    fn make(params: PsmParams) -> Box<dyn ShadowTechnique> {
+        Box::new(Psm::new(params))
     }
 }

@@ -7,8 +7,8 @@ use scene_core::Camera;
 use scene_core::gpu::{GpuGBuffer, GpuShadowQuery, GpuShadowTechnique, Recorder};
 use scene_core::relevance::CasterChunks;
 use scene_core::technique::{
-    Capability, Description, Params, PreparedShadow, Setting, SettingsError, ShadowQuery, ShadowTechnique,
-    Support, TechniqueError, TechniqueFactory,
+    Capability, Description, Params, PreparedShadow, ShadowQuery, ShadowTechnique, Support, TechniqueError,
+    TechniqueFromParams,
 };
 use scene_core::{GBuffer, Report, VisibilityImage};
 
@@ -159,28 +159,11 @@ const SUMMARY: &str = "depth images from the light; hard shadows at the cost of 
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Factory;
 
-impl TechniqueFactory for Factory {
-    fn name(&self) -> &'static str {
-        ShadowMapParams::TECHNIQUE
-    }
+impl TechniqueFromParams for Factory {
+    type Params = ShadowMapParams;
+    const SUMMARY: &'static str = SUMMARY;
 
-    fn summary(&self) -> &'static str {
-        SUMMARY
-    }
-
-    fn settings(&self) -> &'static [Setting] {
-        ShadowMapParams::SETTINGS
-    }
-
-    fn presets(&self) -> Vec<&'static str> {
-        ShadowMapParams::PRESETS.iter().map(|preset| preset.name).collect()
-    }
-
-    fn create(
-        &self,
-        preset: Option<&str>,
-        overrides: &[(String, String)],
-    ) -> Result<Box<dyn ShadowTechnique>, SettingsError> {
-        Ok(Box::new(ShadowMap::new(ShadowMapParams::from_overrides(preset, overrides)?)))
+    fn make(params: ShadowMapParams) -> Box<dyn ShadowTechnique> {
+        Box::new(ShadowMap::new(params))
     }
 }

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 use scene_core::technique::{
-    Capability, Description, Params, PreparedShadow, Setting, SettingsError, ShadowQuery, ShadowTechnique,
-    Support, TechniqueError, TechniqueFactory,
+    Capability, Description, Params, PreparedShadow, ShadowQuery, ShadowTechnique, Support, TechniqueError,
+    TechniqueFromParams,
 };
 use scene_core::{GBuffer, Report, VisibilityImage};
 
@@ -89,28 +89,11 @@ const SUMMARY: &str = "shadow volumes from silhouettes: exact hard shadows on an
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Factory;
 
-impl TechniqueFactory for Factory {
-    fn name(&self) -> &'static str {
-        VolumeParams::TECHNIQUE
-    }
+impl TechniqueFromParams for Factory {
+    type Params = VolumeParams;
+    const SUMMARY: &'static str = SUMMARY;
 
-    fn summary(&self) -> &'static str {
-        SUMMARY
-    }
-
-    fn settings(&self) -> &'static [Setting] {
-        VolumeParams::SETTINGS
-    }
-
-    fn presets(&self) -> Vec<&'static str> {
-        VolumeParams::PRESETS.iter().map(|preset| preset.name).collect()
-    }
-
-    fn create(
-        &self,
-        preset: Option<&str>,
-        overrides: &[(String, String)],
-    ) -> Result<Box<dyn ShadowTechnique>, SettingsError> {
-        Ok(Box::new(StencilVolumes::new(VolumeParams::from_overrides(preset, overrides)?)))
+    fn make(params: VolumeParams) -> Box<dyn ShadowTechnique> {
+        Box::new(StencilVolumes::new(params))
     }
 }

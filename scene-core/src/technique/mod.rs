@@ -4,12 +4,14 @@
 //! The algorithms themselves live on concrete types in the technique crates and can be called without it.
 
 mod capability;
+mod factory;
 mod settings;
 
 use glam::Vec3;
 use thiserror::Error;
 
 pub use capability::{Capability, Description, Support};
+pub use factory::{TechniqueFactory, TechniqueFromParams};
 pub use settings::{Params, Preset, Setting, SettingKind, SettingsError};
 
 use crate::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
@@ -121,25 +123,4 @@ pub trait PreparedShadow: Send + Sync {
 
     /// Whether the preparation still holds when only the camera moves.
     fn survives_camera(&self) -> bool;
-}
-
-/// How the command line and tests make a technique from settings: one value per technique crate.
-pub trait TechniqueFactory: Send + Sync {
-    /// The technique's name.
-    fn name(&self) -> &'static str;
-    /// One line: what it is.
-    fn summary(&self) -> &'static str;
-    /// Every setting with unit, range and default.
-    fn settings(&self) -> &'static [Setting];
-    /// Names of the quality ladder, fastest first.
-    fn presets(&self) -> Vec<&'static str>;
-    /// A technique from a preset (or the defaults) with `overrides` (`key`, value as text) applied on top.
-    ///
-    /// # Errors
-    /// Unknown preset or key, a value of the wrong type or out of range.
-    fn create(
-        &self,
-        preset: Option<&str>,
-        overrides: &[(String, String)],
-    ) -> Result<Box<dyn ShadowTechnique>, SettingsError>;
 }
