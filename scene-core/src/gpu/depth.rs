@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use glam::Mat4;
 
-use super::held::{HeldBuffer, HeldGroup, binding};
+use super::held::{Bound, HeldBuffer, HeldGroup, binding};
 use super::layout::DepthUniform;
 use super::pipeline::{RenderPipelineParts, render_pipeline, shader_module};
 use super::scene::SceneBindings;
@@ -34,6 +34,8 @@ pub struct DepthTarget<'a> {
     pub ids: Option<&'a wgpu::TextureView>,
     /// The projection, with reversed Z. Any: perspective, orthographic, a cube's face.
     pub clip_from_world: Mat4,
+    /// If given, the projection is what this holds when the pass is executed, and `clip_from_world` is ignored.
+    pub written: Option<WrittenProjection<'a>>,
     /// If given, only triangles in these ranges are drawn, in any order; what lies outside the scene is ignored.
     /// Ranges that overlap are drawn twice.
     pub triangles: Option<&'a [Range<u32>]>,
@@ -44,10 +46,27 @@ pub struct DepthTarget<'a> {
     pub clear: bool,
 }
 
+/// A projection that a pass before computes on the GPU: a [`DepthUniform`] in a buffer of usage `UNIFORM`.
+#[derive(Clone, Copy, Debug)]
+pub struct WrittenProjection<'a> {
+    /// The buffer.
+    pub buffer: &'a wgpu::Buffer,
+    /// Where in it, in bytes: a multiple of the device's `min_uniform_buffer_offset_alignment` (256 at most).
+    pub offset: u64,
+}
+
 impl<'a> DepthTarget<'a> {
     /// All casters over the whole, cleared view.
     pub fn new(depth: &'a wgpu::TextureView, clip_from_world: Mat4) -> Self {
-        Self { depth, ids: None, clip_from_world, triangles: None, viewport: None, clear: true }
+        Self {
+            depth,
+            ids: None,
+            clip_from_world,
+            written: None,
+            triangles: None,
+            viewport: None,
+            clear: true,
+        }
     }
 }
 
@@ -149,9 +168,16 @@ impl DepthPass {
                 });
             }
             let (uniform, group) = &mut self.views[index];
-            let uniform =
-                uniform.get(device, bytemuck::bytes_of(&DepthUniform::new(target.clip_from_world, origin)));
-            let view_group = group.get(device, &[uniform.into()]);
+            let view = match target.written {
+                Some(WrittenProjection { buffer, offset }) => {
+                    Bound::Part { buffer: buffer.clone(), offset, size: size_of::<DepthUniform>() as u64 }
+                }
+                None => {
+                    let view = DepthUniform::new(target.clip_from_world, origin);
+                    uniform.get(device, bytemuck::bytes_of(&view)).into()
+                }
+            };
+            let view_group = group.get(device, &[view]);
             let span = recorder.stage(stage);
             let mut pass = begin(recorder.encoder, target, ids, &span);
             pass.set_bind_group(0, &view_group, &[]);

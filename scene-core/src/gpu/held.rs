@@ -43,6 +43,15 @@ impl HeldBuffer {
 pub enum Bound {
     /// A whole buffer.
     Buffer(wgpu::Buffer),
+    /// Part of a buffer.
+    Part {
+        /// The buffer.
+        buffer: wgpu::Buffer,
+        /// Where it starts, in bytes, aligned as the device asks.
+        offset: u64,
+        /// Bytes, more than 0.
+        size: u64,
+    },
     /// A view of a texture.
     Texture(wgpu::TextureView),
     /// A sampler.
@@ -53,6 +62,11 @@ impl Bound {
     fn resource(&self) -> wgpu::BindingResource<'_> {
         match self {
             Self::Buffer(buffer) => buffer.as_entire_binding(),
+            Self::Part { buffer, offset, size } => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                buffer,
+                offset: *offset,
+                size: std::num::NonZeroU64::new(*size),
+            }),
             Self::Texture(view) => wgpu::BindingResource::TextureView(view),
             Self::Sampler(sampler) => wgpu::BindingResource::Sampler(sampler),
         }

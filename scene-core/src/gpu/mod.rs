@@ -24,9 +24,9 @@
 //!
 //! # Shared WGSL
 //! `shaders/*.wesl` of this crate are WESL modules: `scene_core::camera`, `light`, `sampling`, `gbuffer`, `scene`,
-//! `cutout`, `receivers` and `full_screen` are imported by technique crates at build time (crate `gnomon-shader-build`
-//! says how and why). Bind groups have fixed places: 0 is the pass's own, 1 the scene's triangles, 2 its cut-outs, 3
-//! the receivers and the light.
+//! `cutout`, `receivers`, `receiver_plane` and `full_screen` are imported by technique crates at build time (crate
+//! `gnomon-shader-build` says how and why). Bind groups have fixed places: 0 is the pass's own, 1 the scene's triangles,
+//! 2 its cut-outs, 3 the receivers and the light.
 
 pub mod adapter;
 pub mod depth;
@@ -47,7 +47,7 @@ pub mod timing;
 pub mod visibility;
 
 pub use adapter::Gpu;
-pub use depth::{DepthIds, DepthPass, DepthTarget};
+pub use depth::{DepthIds, DepthPass, DepthTarget, WrittenProjection};
 pub use error::GpuError;
 pub use gbuffer::{GBufferPass, GBufferTargets, GpuGBuffer};
 pub use headless::{HeadlessError, HeadlessFrame, HeadlessRun, HeadlessView};

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use glam::{Affine3A, DMat4, DVec3, Mat4, Vec2, Vec3, Vec4};
 use gnomon_scene_core::geometry::{AlphaMask, ObjectFlags, Wrap};
 use gnomon_scene_core::gpu::{
-    DepthIds, DepthPass, DepthTarget, GBufferPass, GBufferTargets, Gpu, Recorder, SceneBuffers, StageTimer,
-    testing,
+    DepthIds, DepthPass, DepthTarget, DepthUniform, GBufferPass, GBufferTargets, Gpu, Recorder, SceneBuffers,
+    StageTimer, WrittenProjection, testing,
 };
 use gnomon_scene_core::raster::render_gbuffer;
 use gnomon_scene_core::{Camera, GBuffer, Scene, TriangleMesh};
@@ -323,6 +323,38 @@ fn depth_maps_are_what_rays_from_the_light_meet() {
             assert!(filled > (SIDE * SIDE / 2) as usize, "{kind:?} {index}: {filled}");
         }
     }
+}
+
+#[test]
+fn a_projection_that_lies_in_a_buffer_draws_the_same_map() {
+    let Some(gpu) = testing::gpu() else { return };
+    let scene = scene(Vec3::ZERO);
+    let buffers = SceneBuffers::new(&gpu.device, &scene).unwrap();
+    let clip = projections(Vec3::ZERO)[0];
+    let mut words = vec![0u8; 256];
+    words.extend(bytemuck::bytes_of(&DepthUniform::new(clip, buffers.view(None).bounds.center())));
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: words.len() as u64,
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    gpu.queue.write_buffer(&buffer, 0, &words);
+    let map = |written| {
+        let [depth, _] = depth_textures(&gpu, SIDE, 1);
+        let view = layer(&depth, 0);
+        // Without the buffer's this one would put everything on one place.
+        let given = if written { glam::Mat4::ZERO } else { clip };
+        let written = written.then_some(WrittenProjection { buffer: &buffer, offset: 256 });
+        let target = DepthTarget { written, ..DepthTarget::new(&view, given) };
+        let mut encoder = gpu.encoder();
+        let mut recorder = Recorder::new(&gpu.device, &gpu.queue, &mut encoder);
+        let mut pass = DepthPass::new(&gpu.device, DepthIds::None, None);
+        pass.record(&mut recorder, "prepare.depth", &buffers.view(None), &[target]);
+        gpu.submit(encoder).unwrap();
+        gpu.read_texture::<u32>(&depth, 0).unwrap()
+    };
+    assert!(map(true) == map(false));
 }
 
 #[test]
