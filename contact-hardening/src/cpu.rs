@@ -12,6 +12,7 @@ use crate::multi_pass::multi_pass;
 use crate::paper::Paper;
 use crate::params::Variant;
 use crate::physical::{Physical, Site};
+use crate::smoothing::{Role, role, smooth};
 
 /// What a pixel is before pass 4.
 enum Surroundings {
@@ -42,20 +43,22 @@ pub fn filter(physical: &Physical<'_>, visibility: &mut VisibilityImage, report:
         return;
     }
     let width = physical.distance.width;
-    let rows = visibility.values.par_chunks_mut(width).enumerate();
-    let answer_row = |(row, values): (usize, &mut [f32])| {
+    let mut roles = vec![Role::Apart; visibility.values.len()];
+    let rows = visibility.values.par_chunks_mut(width).zip(roles.par_chunks_mut(width)).enumerate();
+    let answer_row = |(row, (values, roles)): (usize, (&mut [f32], &mut [Role]))| {
         let (mut lit, mut umbra) = (0u64, 0u64);
-        for (column, value) in values.iter_mut().enumerate() {
+        for (column, (value, role)) in values.iter_mut().zip(roles).enumerate() {
             match surroundings(physical, physical.gbuffer, row * width + column) {
                 Surroundings::Known => {}
-                Surroundings::Lit => lit += 1,
-                Surroundings::Umbra => umbra += 1,
-                Surroundings::Penumbra(site) => {
-                    let blockers = physical.search(&site);
-                    if let Some(mean) = blockers.mean() {
-                        *value = physical.filter(&site, &blockers, mean);
-                    }
+                Surroundings::Lit => {
+                    lit += 1;
+                    *role = Role::Certain;
                 }
+                Surroundings::Umbra => {
+                    umbra += 1;
+                    *role = Role::Certain;
+                }
+                Surroundings::Penumbra(site) => (*value, *role) = answer(physical, &site, *value),
             }
         }
         (lit, umbra)
@@ -63,6 +66,20 @@ pub fn filter(physical: &Physical<'_>, visibility: &mut VisibilityImage, report:
     let (lit, umbra) = rows.map(answer_row).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
     report.skip("lit pixels", lit);
     report.skip("umbra pixels", umbra);
+    if physical.params.smooth && roles.par_iter().any(|role| matches!(role, Role::Wide(_))) {
+        report.time("shade.smooth", |_| smooth(physical.gbuffer, &roles, visibility));
+    }
+}
+
+/// V of a pixel whose hard V is `hard`, and how it takes part in the averages.
+fn answer(physical: &Physical<'_>, site: &Site, hard: f32) -> (f32, Role) {
+    let blockers = physical.search(site);
+    match blockers.mean() {
+        // What the pyramid proves stands.
+        Some(mean) if site.is_umbra() => (physical.filter(site, &blockers, mean), Role::Certain),
+        Some(mean) => (physical.filter(site, &blockers, mean), role(physical, site, &blockers)),
+        None => (hard, if hard == 1.0 { Role::Certain } else { Role::Apart }),
+    }
 }
 
 fn filter_in_passes(physical: &Physical<'_>, visibility: &mut VisibilityImage, report: &mut Report) {

@@ -28,14 +28,17 @@ impl Kernel {
     /// at three σ (the paper's 3-sigma rule).
     pub fn of_light(variant: Variant, is_round: bool, taps: u32, seed: u32) -> Self {
         match (variant, is_round) {
-            (Variant::Pcf, true) => Self::even(poisson_points(taps, seed), false),
+            (Variant::Pcf, true) => Self::even(disk_points(taps, seed), false),
             (Variant::Pcf, false) => {
-                let key = SampleKey::new(u64::from(seed), 0);
-                Self::even((0..taps).map(|index| sobol(index, key) * 2.0 - 1.0).collect(), true)
+                Self::even(square_points(taps, seed).map(|point| point * 2.0 - 1.0).collect(), true)
             }
             (Variant::Gaussian | Variant::MultiPass, _) => {
                 let sigma = if is_round { 0.5f32 } else { (1.0f32 / 3.0).sqrt() };
-                let mut kernel = Self::gaussian(taps, seed);
+                let mut kernel = if variant == Variant::Gaussian {
+                    Self::weighed(disk_points(taps, seed))
+                } else {
+                    Self::gaussian(taps, seed)
+                };
                 kernel.points.iter_mut().for_each(|point| *point *= 3.0 * sigma);
                 kernel.reach = 3.0 * sigma;
                 kernel
@@ -45,7 +48,10 @@ impl Kernel {
 
     /// Poisson points of the unit disk, weighed by a Gaussian of σ = ⅓.
     pub fn gaussian(taps: u32, seed: u32) -> Self {
-        let points = poisson_points(taps, seed);
+        Self::weighed(poisson_points(taps, seed))
+    }
+
+    fn weighed(points: Vec<Vec2>) -> Self {
         let weight = |point: &Vec2| (-4.5 * point.length_squared()).exp();
         let sum: f32 = points.iter().map(weight).sum();
         let weights = points.iter().map(|point| weight(point) / sum).collect();
@@ -72,6 +78,26 @@ impl Kernel {
             }
         })
     }
+}
+
+/// The (0, 2)-sequence of the unit square.
+fn square_points(taps: u32, seed: u32) -> impl Iterator<Item = Vec2> {
+    let key = SampleKey::new(u64::from(seed), 0);
+    (0..taps).map(move |index| sobol(index, key))
+}
+
+/// The (0, 2)-sequence brought to the unit disk, equal areas to equal areas.
+fn disk_points(taps: u32, seed: u32) -> Vec<Vec2> {
+    square_points(taps, seed)
+        .map(|square| {
+            let p = square * 2.0 - 1.0;
+            // Shirley and Chiu's concentric map: the larger coordinate is the radius.
+            let (radius, other) = if p.x.abs() > p.y.abs() { (p.x, p.y) } else { (p.y, p.x) };
+            let angle = if radius == 0.0 { 0.0 } else { other / radius * std::f32::consts::FRAC_PI_4 };
+            let (along, across) = (radius * angle.cos(), radius * angle.sin());
+            if p.x.abs() > p.y.abs() { Vec2::new(along, across) } else { Vec2::new(across, along) }
+        })
+        .collect()
 }
 
 /// 2 if beyond 1.

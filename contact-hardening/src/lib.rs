@@ -9,6 +9,7 @@ pub mod paper;
 mod params;
 pub mod physical;
 pub mod shadow_pyramid;
+pub mod smoothing;
 mod technique;
 
 use std::sync::Arc;

@@ -75,6 +75,9 @@ pub struct ContactHardeningParams {
     pub blocker: Blocker,
     /// Points that lie on another surface than the pixel's do not count. Off is the paper.
     pub geometry: bool,
+    /// Where penumbrae are many pixels wide, neighbouring pixels are averaged, each of which drew its points at random:
+    /// `pcf` and `gaussian` with `physical` scaling. Off is the paper.
+    pub smooth: bool,
     /// Points that the image cannot answer (hidden, outside, or nearer to each other than pixels are) are looked up
     /// in the map, with `physical` scaling. Off is the paper. `multi-pass` never does.
     pub fill: bool,
@@ -103,6 +106,7 @@ impl ContactHardeningParams {
         passes: 10,
         blocker: Blocker::Each,
         geometry: true,
+        smooth: true,
         fill: true,
         kernel_size: 19,
         widening: true,
@@ -176,6 +180,12 @@ impl Params for ContactHardeningParams {
             SettingKind::Bool,
             "",
             "points on another surface than the pixel's do not count; false is the paper",
+        ),
+        setting(
+            "smooth",
+            SettingKind::Bool,
+            "",
+            "average neighbouring pixels where penumbrae are wide, with physical scaling; false is the paper",
         ),
         setting(
             "fill",

@@ -118,7 +118,8 @@ enum Probe {
 }
 
 impl Physical<'_> {
-    fn is_parallel(&self) -> bool {
+    /// Whether the light is infinitely far.
+    pub fn is_parallel(&self) -> bool {
         matches!(self.maps.light, Light::Directional { .. })
     }
 
