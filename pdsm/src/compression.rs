@@ -6,10 +6,12 @@
 //! by any line and stays a step: two nodes at one depth. One shadow map of k makes steps of 1/k, so below a bound of
 //! 1/(2k) every step costs two nodes.
 
+use bytemuck::{Pod, Zeroable};
+
 use crate::events::Event;
 
 /// A point of a piecewise linear function of t. Of two nodes at the same t the first is the limit from before.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Node {
     /// Depth along the ray, in the layout's parameter.

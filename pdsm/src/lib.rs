@@ -6,6 +6,8 @@ pub mod crossings;
 pub mod emission;
 pub mod events;
 pub mod functions;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod grid;
 pub mod layout;
 mod params;

@@ -1,12 +1,18 @@
 //! The trait's implementation, nothing else.
 
 use glam::Vec3;
+#[cfg(feature = "gpu")]
+use scene_core::Camera;
+#[cfg(feature = "gpu")]
+use scene_core::gpu::{GpuGBuffer, GpuShadowQuery, GpuShadowTechnique, Recorder};
 use scene_core::technique::{
     Capability, Description, Params, PreparedShadow, ShadowQuery, ShadowTechnique, Support, TechniqueError,
     TechniqueFromParams,
 };
 use scene_core::{GBuffer, Report, VisibilityImage};
 
+#[cfg(feature = "gpu")]
+use crate::gpu::PdsmOnGpu;
 use crate::{Pdsm, PdsmParams, PreparedPdsm};
 
 impl ShadowTechnique for Pdsm {
@@ -27,7 +33,10 @@ impl ShadowTechnique for Pdsm {
             }
             Capability::AlphaMask | Capability::TriangleSoup => Support::Exact,
             Capability::FreePoints => Support::Exact,
-            Capability::Gpu => Support::Unsupported("the CPU path is the only one so far"),
+            Capability::Gpu if !cfg!(feature = "gpu") => {
+                Support::Unsupported("built without the feature 'gpu'")
+            }
+            Capability::Gpu => Support::Exact,
         };
         Description {
             summary: SUMMARY,
@@ -45,6 +54,40 @@ impl ShadowTechnique for Pdsm {
     ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError> {
         let (prepared, report) = Pdsm::prepare(self, query.scene, query.light);
         Ok((Box::new(prepared), report))
+    }
+
+    #[cfg(feature = "gpu")]
+    fn gpu(
+        &self,
+        device: &wgpu::Device,
+        visibility: wgpu::TextureFormat,
+    ) -> Result<Box<dyn GpuShadowTechnique>, TechniqueError> {
+        Ok(Box::new(PdsmOnGpu::new(device, self.params, visibility)))
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl GpuShadowTechnique for PdsmOnGpu {
+    fn prepare(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        query: &GpuShadowQuery<'_>,
+    ) -> Result<Report, TechniqueError> {
+        PdsmOnGpu::prepare(self, recorder, query)
+    }
+
+    fn shade(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        camera: &Camera,
+        gbuffer: &GpuGBuffer<'_>,
+        visibility: &wgpu::TextureView,
+    ) -> Result<Report, TechniqueError> {
+        PdsmOnGpu::shade(self, recorder, camera, gbuffer, visibility)
+    }
+
+    fn survives_camera(&self) -> bool {
+        true
     }
 }
 

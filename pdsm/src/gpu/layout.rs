@@ -1,0 +1,134 @@
+//! Uniforms as the shaders read them. A test holds every offset against the linked WGSL.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec2, Vec3};
+
+use crate::cpu::Window;
+use crate::layout::Depth;
+
+/// Most windows of one light: the faces of a cube.
+pub const MOST_WINDOWS: usize = 6;
+
+/// What stands for an infinite tangent: shaders need not know infinities, and no point is seen at it.
+const ANY_TAN: f32 = 1e30;
+
+/// `Window` of `functions.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct WindowUniform {
+    /// Origin of the axes.
+    pub origin: Vec3,
+    /// Pixels a side.
+    pub size: u32,
+    /// Axes of the window.
+    pub x: Vec3,
+    /// Texels a pixel along each side.
+    pub ratio: u32,
+    /// Likewise.
+    pub y: Vec3,
+    /// z of the window.
+    pub focus: f32,
+    /// The way that light travels.
+    pub z: Vec3,
+    /// t per unit of z in parallel light; 0 in central light.
+    pub per_unit: f32,
+    /// Lower corner on the window's plane.
+    pub corner: Vec2,
+    /// Texels per unit there.
+    pub texels_per_unit: Vec2,
+    /// The largest offset of a sample along each axis.
+    pub reach: Vec2,
+    /// Largest tangent from the axis of points that belong here.
+    pub max_tan: f32,
+    /// Where the window's pixels begin in the index array.
+    pub first_index: u32,
+    /// Where its samples begin among the offsets.
+    pub first_offset: u32,
+    /// Samples of the light.
+    pub views: u32,
+    /// Zero.
+    pub padding: [u32; 2],
+}
+
+impl WindowUniform {
+    /// What shaders need of `window`, whose pixels and samples follow `first_index` and `first_offset` others.
+    pub fn new(window: &Window, first_index: u32, first_offset: u32) -> Self {
+        let layout = &window.layout;
+        let [x, y, z] = layout.axes;
+        let (focus, per_unit) = match layout.depth {
+            Depth::Central { focus } => (focus, 0.0),
+            Depth::Parallel { focus, per_unit } => (focus, per_unit),
+        };
+        Self {
+            origin: layout.origin,
+            size: window.grid.size,
+            x,
+            ratio: window.grid.ratio,
+            y,
+            focus,
+            z,
+            per_unit,
+            corner: layout.corner,
+            texels_per_unit: layout.texels_per_unit,
+            reach: layout.reach,
+            max_tan: layout.max_tan.min(ANY_TAN),
+            first_index,
+            first_offset,
+            views: layout.offsets.len() as u32,
+            padding: [0; 2],
+        }
+    }
+}
+
+/// `Pdsm` of `functions.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct PdsmUniform {
+    /// The windows, of which the first `count` are there.
+    pub windows: [WindowUniform; MOST_WINDOWS],
+    /// How many there are.
+    pub count: u32,
+    /// [`plane_tolerance`](gnomon_shadow_map::receiver_plane::plane_tolerance).
+    pub tolerance: f32,
+    /// 1 if four pixels are read, 0 if the nearest one.
+    pub bilinear: u32,
+    /// Zero.
+    pub padding: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use scene_core::assert_layout;
+
+    use super::*;
+    use crate::compression::Node;
+    use crate::gpu::shaders::SHADE;
+
+    #[test]
+    fn layouts_are_those_of_the_shaders() {
+        assert_layout!(
+            WindowUniform,
+            SHADE,
+            "Window",
+            [
+                origin,
+                size,
+                x,
+                ratio,
+                y,
+                focus,
+                z,
+                per_unit,
+                corner,
+                texels_per_unit,
+                reach,
+                max_tan,
+                first_index,
+                first_offset,
+                views
+            ]
+        );
+        assert_layout!(PdsmUniform, SHADE, "Pdsm", [windows, count, tolerance, bilinear]);
+        assert_layout!(Node, SHADE, "Node", [t, visibility]);
+    }
+}

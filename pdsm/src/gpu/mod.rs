@@ -1,0 +1,164 @@
+//! The GPU path: functions built by the CPU path's own code, uploaded as they lie in memory (figure 6), and looked up in
+//! one full-screen pass, in the order and with the names of [`cpu`](crate::cpu).
+//!
+//! V differs from the CPU's by rounding alone: the G-buffer's positions are found again from their depths, and a depth
+//! that is a step of a function falls before or after it.
+
+pub mod layout;
+pub mod shaders;
+
+use scene_core::gpu::{
+    GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings,
+    SceneGroups, VisibilityPass, VisibilityPassParts, binding,
+};
+use scene_core::technique::{Params as _, TechniqueError};
+use scene_core::{Camera, Report};
+use wgpu::util::DeviceExt as _;
+
+use crate::{Pdsm, PdsmParams, PreparedPdsm};
+use layout::{MOST_WINDOWS, PdsmUniform, WindowUniform};
+
+/// The technique on one device: pipelines, and the functions of the light prepared last.
+#[derive(Debug)]
+pub struct PdsmOnGpu {
+    technique: Pdsm,
+    uniform: HeldBuffer,
+    own: HeldGroup,
+    scene: SceneBindings,
+    receivers: Receivers,
+    lookup: VisibilityPass,
+    prepared: Option<Prepared>,
+}
+
+/// What `prepare` leaves to `shade`.
+#[derive(Debug)]
+struct Prepared {
+    own: wgpu::BindGroup,
+    scene: SceneGroups,
+    bytes: u64,
+}
+
+impl PdsmOnGpu {
+    /// Makes the pipelines. `visibility` is the format of the texture that V is written to.
+    pub fn new(device: &wgpu::Device, params: PdsmParams, visibility: wgpu::TextureFormat) -> Self {
+        let stages = wgpu::ShaderStages::FRAGMENT;
+        let types = [binding::UNIFORM, binding::STORAGE, binding::STORAGE, binding::STORAGE];
+        let own = HeldGroup::new(device, "penumbra deep shadow map", stages, &types);
+        let scene = SceneBindings::new(device, stages);
+        let receivers = Receivers::new(device);
+        let lookup = VisibilityPass::new(
+            device,
+            &VisibilityPassParts {
+                label: "pdsm",
+                wgsl: shaders::SHADE,
+                fragment: "shade_pdsm",
+                own: own.layout(),
+                scene: &scene,
+                receivers: &receivers,
+                format: visibility,
+            },
+        );
+        Self {
+            technique: Pdsm::new(params),
+            uniform: HeldBuffer::uniform("pdsm"),
+            own,
+            scene,
+            receivers,
+            lookup,
+            prepared: None,
+        }
+    }
+
+    /// Builds the PDSM of the query's light on the CPU and copies it to the device. It holds for any camera.
+    ///
+    /// # Errors
+    /// A scene without [`GpuScene::geometry`](scene_core::gpu::GpuScene::geometry); more functions than the device binds
+    /// in one piece.
+    pub fn prepare(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        query: &GpuShadowQuery<'_>,
+    ) -> Result<Report, TechniqueError> {
+        self.prepared = None;
+        let geometry = query.scene.geometry.ok_or_else(|| TechniqueError::Unsupported {
+            technique: PdsmParams::TECHNIQUE,
+            input: "a scene on the GPU alone".to_owned(),
+            why: "its maps are drawn on the CPU: hand over the geometry in memory, too".to_owned(),
+        })?;
+        let (pdsm, mut report) = self.technique.prepare(geometry, query.light);
+        report.time("prepare.upload", |_| self.upload(recorder.device, query, &pdsm))?;
+        Ok(report)
+    }
+
+    /// `prepare.upload`: functions that are there already, built or read from a file, are copied to the device.
+    ///
+    /// # Errors
+    /// More functions than the device binds in one piece.
+    pub fn upload(
+        &mut self,
+        device: &wgpu::Device,
+        query: &GpuShadowQuery<'_>,
+        pdsm: &PreparedPdsm<'_>,
+    ) -> Result<(), TechniqueError> {
+        self.prepared = None;
+        let mut uniform = PdsmUniform {
+            count: pdsm.windows.len() as u32,
+            tolerance: pdsm.tolerance,
+            bilinear: u32::from(pdsm.bilinear),
+            ..bytemuck::Zeroable::zeroed()
+        };
+        GpuError::within("windows", uniform.count, MOST_WINDOWS as u32)?;
+        let (mut index, mut nodes, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
+        for (into, window) in uniform.windows.iter_mut().zip(&pdsm.windows) {
+            *into = WindowUniform::new(window, index.len() as u32, offsets.len() as u32);
+            // Far below u32's end: what the device binds in one piece, checked below, are fewer.
+            let first = nodes.len() as u32;
+            index.extend(window.functions.index().iter().map(|&start| start.wrapping_add(first)));
+            nodes.extend_from_slice(window.functions.nodes());
+            offsets.extend_from_slice(&window.layout.offsets);
+        }
+        let index = storage(device, "index of functions", bytemuck::cast_slice(&index))?;
+        let nodes = storage(device, "nodes of functions", bytemuck::cast_slice(&nodes))?;
+        let offsets = storage(device, "samples of the light", bytemuck::cast_slice(&offsets))?;
+        let bytes = index.size() + nodes.size() + offsets.size();
+        let uniform = self.uniform.get(device, bytemuck::bytes_of(&uniform));
+        let bound = [uniform.into(), index.into(), nodes.into(), offsets.into()];
+        let own = self.own.get(device, &bound);
+        self.prepared = Some(Prepared { own, scene: self.scene.groups(device, &query.scene), bytes });
+        self.receivers.prepare(device, query);
+        Ok(())
+    }
+
+    /// `shade.lookup`: records the pass that writes V of every pixel, 1 where nothing is seen.
+    ///
+    /// # Errors
+    /// [`TechniqueError::NotPrepared`].
+    pub fn shade(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        camera: &Camera,
+        gbuffer: &GpuGBuffer<'_>,
+        visibility: &wgpu::TextureView,
+    ) -> Result<Report, TechniqueError> {
+        let not_prepared = || TechniqueError::NotPrepared { technique: PdsmParams::TECHNIQUE };
+        let prepared = self.prepared.as_ref().ok_or_else(not_prepared)?;
+        let receivers = self.receivers.group(recorder.device, camera, gbuffer).ok_or_else(not_prepared)?;
+        self.lookup.record(recorder, "shade.lookup", &prepared.own, &prepared.scene, &receivers, visibility);
+        Ok(Report { bytes: prepared.bytes, ..Default::default() })
+    }
+}
+
+/// A buffer that shaders read; 16 bytes of zeros for none, since a binding must not be empty.
+fn storage(device: &wgpu::Device, what: &'static str, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
+    let limits = device.limits();
+    let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    if bytes.len() as u64 > limit {
+        return Err(GpuError::TooLarge { what, bytes: bytes.len() as u64, limit });
+    }
+    let contents = if bytes.is_empty() { &[0; 16] } else { bytes };
+    Ok(device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some(what),
+        contents,
+        usage: wgpu::BufferUsages::STORAGE,
+    }))
+}
