@@ -4,6 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::bench::shard::Shard;
+use crate::bench::station::Axis;
+
 /// Real-time shadow techniques, measured against ray-traced ground truth.
 ///
 /// Gnomon renders a scene with any of its shadow techniques, holds each against ground truth and says what it
@@ -20,6 +23,7 @@ Examples:
   gnomon compare dragon.obj            every technique beside ground truth, in out/dragon/index.html
   gnomon render chess --technique shadow-map --out out/chess
   gnomon reference cornell --samples 1024 --out out/truth
+  gnomon bench ball quads              run time against error, in out/bench/index.html
   gnomon techniques shadow-map         its settings, their units, ranges and defaults
   gnomon scenes                        built-in scenes and their parameters
 
@@ -59,6 +63,8 @@ pub(crate) enum Command {
     Render(RenderArgs),
     /// Ground truth: visibility by ray tracing, with an error estimate
     Reference(ReferenceArgs),
+    /// Run time against error over every technique, variant and preset: charts, tables, HTML page
+    Bench(BenchArgs),
     /// Techniques with their settings, units, ranges, defaults and presets
     Techniques(TechniquesArgs),
     /// Built-in scenes and their parameters
@@ -195,6 +201,73 @@ pub(crate) struct ReferenceArgs {
     pub(crate) truth: TruthArgs,
     /// Folder to write to; files of the same names are replaced
     #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}
+
+/// `gnomon bench`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  gnomon bench                                       every built-in scene
+  gnomon bench ball dragon.obj --defaults            untouched settings only, beside ray tracing
+  gnomon bench ball --sweep triangles,image,map,light
+  gnomon bench --shard 3/8 --out out/bench-3         one of eight parts, on a machine of its own
+  gnomon bench --merge out/bench-1,out/bench-2 --out out/bench
+
+Shards by GNU parallel, a Slurm array and a Kubernetes indexed job:
+  parallel -j1 gnomon bench --shard {}/8 --out out/bench-{} ::: $(seq 8)
+  sbatch --array=1-8 --wrap 'gnomon bench --shard $SLURM_ARRAY_TASK_ID/8 --out out/bench-$SLURM_ARRAY_TASK_ID'
+  command: [sh, -c, 'gnomon bench --shard $((JOB_COMPLETION_INDEX + 1))/8 --out /out/bench-$JOB_COMPLETION_INDEX']
+
+Writes results.jsonl (a line as soon as a cell is measured: an interrupted run goes on where it stopped), results.csv, \
+results.json, a chart for each scene and error (SVG and PNG) and index.html. Ground truth is kept in truth/. Times are \
+medians of runs after one to warm up. Ray tracing with 1, 4, 16, 64 and 256 samples is measured beside, plain and with \
+the proofs that leave rays out.")]
+pub(crate) struct BenchArgs {
+    /// Scenes: files, meshes or built-in ones [default: every built-in scene]
+    #[arg(value_name = "SCENE")]
+    pub(crate) scenes: Vec<String>,
+    /// Techniques, separated by commas [default: all]
+    #[arg(long, value_name = "A,B", value_delimiter = ',')]
+    pub(crate) techniques: Vec<String>,
+    /// Each technique with its settings untouched, not in every variant and preset
+    #[arg(long)]
+    pub(crate) defaults: bool,
+    /// Cost curves besides, of the defaults: over triangles of `forest`; over the others with the first scene
+    #[arg(long, value_enum, value_name = "AXIS", value_delimiter = ',')]
+    pub(crate) sweep: Vec<Axis>,
+    /// Image size in pixels
+    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "512x512")]
+    pub(crate) size: (u32, u32),
+    /// Which of each scene's lights, counted from 0
+    #[arg(long, value_name = "INDEX", default_value_t = 0)]
+    pub(crate) light: usize,
+    /// Seed of all random choices; ray tracing as a contender gets another one than ground truth
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Shadow rays a pixel of ground truth
+    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    pub(crate) samples: u32,
+    /// Timed runs of a cell; none begins after two seconds
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub(crate) runs: u16,
+    /// Where techniques run; cpu,gpu measures both
+    #[arg(long, value_enum, value_name = "BACKEND", value_delimiter = ',', default_value = "auto")]
+    pub(crate) backend: Vec<Backend>,
+    /// Measure every N-th cell only, beginning with the I-th
+    #[arg(long, value_name = "I/N", default_value_t = Shard::WHOLE)]
+    pub(crate) shard: Shard,
+    /// Measure nothing: put the results of these folders together
+    #[arg(long, value_name = "DIR,DIR", value_delimiter = ',')]
+    pub(crate) merge: Vec<PathBuf>,
+    /// Forget what was measured before
+    #[arg(long)]
+    pub(crate) fresh: bool,
+    /// Folder of ground truth, to share it among runs [default: truth in the folder to write to]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) truth: Option<PathBuf>,
+    /// Folder to write to, and to go on in
+    #[arg(long, value_name = "DIR", default_value = "out/bench")]
     pub(crate) out: PathBuf,
 }
 

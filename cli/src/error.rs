@@ -74,6 +74,21 @@ pub(crate) enum CliError {
         #[source]
         source: Box<dyn std::error::Error + Send + Sync>,
     },
+    #[error("cannot read {}: is it a folder that `gnomon bench` wrote?", path.display())]
+    ReadRecords {
+        path: PathBuf,
+        #[source]
+        source: io::Error,
+    },
+    #[error("{}:{line} is no record of this version; --fresh begins anew", path.display())]
+    Record {
+        path: PathBuf,
+        line: usize,
+        #[source]
+        source: serde_json::Error,
+    },
+    #[error("cannot draw a chart: {0}")]
+    Chart(String),
     #[error("cannot write {}", path.display())]
     Write {
         path: PathBuf,

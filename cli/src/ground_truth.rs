@@ -87,7 +87,7 @@ pub(crate) fn trace(
         std_error: traced.std_error,
         valid: valid_pixels(gbuffer, light),
     };
-    let subject = Subject { technique: "reference".to_owned(), variant, settings };
+    let subject = Subject { technique: "reference".to_owned(), variant, settings, survives_camera: true };
     Ok((truth, RunReport::new(view, subject, prepare_ms, shade_ms, report)))
 }
 

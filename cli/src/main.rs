@@ -6,6 +6,7 @@
 
 mod args;
 mod backend;
+mod bench;
 mod commands;
 mod compare;
 mod console;
@@ -53,6 +54,7 @@ fn run(arguments: &Arguments) -> Result<(), CliError> {
         Command::Compare(arguments) => commands::compare::run(arguments, &console),
         Command::Render(arguments) => commands::render::run(arguments, &console),
         Command::Reference(arguments) => commands::reference::run(arguments, &console),
+        Command::Bench(arguments) => commands::bench::run(arguments, &console),
         Command::Techniques(arguments) => commands::techniques::run(arguments, &console),
         Command::Scenes => commands::scenes::run(&console),
     }

@@ -23,6 +23,24 @@ pub(crate) struct Run {
     pub(crate) report: RunReport,
 }
 
+/// How often a run is repeated.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Repeats {
+    /// At most so many runs; one at least.
+    pub(crate) runs: usize,
+    /// No further run begins after so many milliseconds.
+    pub(crate) budget_ms: f64,
+}
+
+/// Runs of one technique on one view.
+#[derive(Clone, Debug)]
+pub(crate) struct Repeated {
+    pub(crate) fastest: Run,
+    /// Milliseconds of each run: prepare and shade. The first pays for cold caches and fresh memory, which a renderer
+    /// pays once and not per frame.
+    pub(crate) times_ms: Vec<(f64, f64)>,
+}
+
 /// A view that techniques are run on. Both backends are asked about the same G-buffer.
 pub(crate) struct Stand<'a> {
     view: &'a View,
@@ -44,7 +62,8 @@ impl<'a> Stand<'a> {
         }
     }
 
-    /// Prepares and shades up to `runs` times on `side`, and returns the fastest run.
+    /// Prepares and shades up to `runs` times on `side` (no further run begins after two seconds), and returns the
+    /// fastest.
     ///
     /// Under [`Backend::Auto`] what the GPU cannot do is done on the CPU.
     pub(crate) fn run(
@@ -54,21 +73,29 @@ impl<'a> Stand<'a> {
         runs: usize,
         console: &Console,
     ) -> Result<Run, CliError> {
-        match self.fastest(technique, side, runs) {
+        let repeats = Repeats { runs, budget_ms: 2000.0 };
+        let repeated = match self.repeat(technique, side, repeats) {
             Err(error) if backend == Backend::Auto && side == Side::Gpu && error.is_of_gpu() => {
                 console.note(&format!("note: {} runs on the CPU: {error}", technique.name()));
                 // A device that failed once is not asked again.
                 self.gpu = None;
-                self.fastest(technique, Side::Cpu, runs)
+                self.repeat(technique, Side::Cpu, repeats)
             }
             result => result,
-        }
+        };
+        Ok(repeated?.fastest)
     }
 
-    fn fastest(&mut self, technique: &dyn ShadowTechnique, side: Side, runs: usize) -> Result<Run, CliError> {
+    /// Prepares and shades as often as `repeats` says.
+    pub(crate) fn repeat(
+        &mut self,
+        technique: &dyn ShadowTechnique,
+        side: Side,
+        repeats: Repeats,
+    ) -> Result<Repeated, CliError> {
         match (side, self.gpu) {
-            (Side::Cpu, _) | (Side::Gpu, None) => fastest_of(runs, || self.on_cpu(technique)),
-            (Side::Gpu, Some(gpu)) => self.on_gpu(technique, gpu, runs),
+            (Side::Cpu, _) | (Side::Gpu, None) => repeat(repeats, || self.on_cpu(technique)),
+            (Side::Gpu, Some(gpu)) => self.on_gpu(technique, gpu, repeats),
         }
     }
 
@@ -84,17 +111,18 @@ impl<'a> Stand<'a> {
         let shaded = prepared.shade(gbuffer, &mut visibility)?;
         let shade_ms = milliseconds_since(start);
         report.merge(&shaded);
-        Ok(Run { visibility, report: RunReport::new(view, subject(technique), prepare_ms, shade_ms, report) })
+        let subject = subject(technique, prepared.survives_camera());
+        Ok(Run { visibility, report: RunReport::new(view, subject, prepare_ms, shade_ms, report) })
     }
 
-    /// The fastest run on the GPU; pipelines are made once.
+    /// Runs on the GPU; pipelines are made once.
     #[cfg(feature = "gpu")]
     fn on_gpu(
         &mut self,
         technique: &dyn ShadowTechnique,
         gpu: &'a Gpu,
-        runs: usize,
-    ) -> Result<Run, CliError> {
+        repeats: Repeats,
+    ) -> Result<Repeated, CliError> {
         let (view, gbuffer) = (self.view, self.gbuffer);
         let stage = match &mut self.on_gpu {
             Some(stage) => stage,
@@ -105,43 +133,49 @@ impl<'a> Stand<'a> {
             }
         };
         let mut on_gpu = stage.technique(technique)?;
-        fastest_of(runs, || {
+        repeat(repeats, || {
             let run = stage.run(on_gpu.as_mut(), view.light(), gbuffer)?;
-            let report = RunReport::new(view, subject(technique), run.prepare_ms, run.shade_ms, run.report);
+            let subject = subject(technique, on_gpu.survives_camera());
+            let report = RunReport::new(view, subject, run.prepare_ms, run.shade_ms, run.report);
             Ok(Run { visibility: run.visibility, report })
         })
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn on_gpu(&mut self, _: &dyn ShadowTechnique, gpu: &'a Gpu, _: usize) -> Result<Run, CliError> {
+    fn on_gpu(&mut self, _: &dyn ShadowTechnique, gpu: &'a Gpu, _: Repeats) -> Result<Repeated, CliError> {
         match *gpu {}
     }
 }
 
-/// The fastest of up to `runs` runs; no further one begins after two seconds. The first one pays for cold caches and
-/// fresh memory, which a renderer pays once and not per frame.
-fn fastest_of(runs: usize, mut run: impl FnMut() -> Result<Run, CliError>) -> Result<Run, CliError> {
-    const BUDGET_MS: f64 = 2000.0;
+/// Runs, and repeats.
+pub(crate) fn repeat(
+    repeats: Repeats,
+    mut run: impl FnMut() -> Result<Run, CliError>,
+) -> Result<Repeated, CliError> {
+    let times = |run: &Run| (run.report.prepare_ms, run.report.shade_ms);
     let total_ms = |run: &Run| run.report.prepare_ms + run.report.shade_ms;
     let start = Instant::now();
-    let mut best = run()?;
-    for _ in 1..runs {
-        if milliseconds_since(start) > BUDGET_MS {
+    let mut fastest = run()?;
+    let mut times_ms = vec![times(&fastest)];
+    for _ in 1..repeats.runs {
+        if milliseconds_since(start) > repeats.budget_ms {
             break;
         }
         let next = run()?;
-        if total_ms(&next) < total_ms(&best) {
-            best = next;
+        times_ms.push(times(&next));
+        if total_ms(&next) < total_ms(&fastest) {
+            fastest = next;
         }
     }
-    Ok(best)
+    Ok(Repeated { fastest, times_ms })
 }
 
-fn subject(technique: &dyn ShadowTechnique) -> Subject {
+fn subject(technique: &dyn ShadowTechnique, survives_camera: bool) -> Subject {
     Subject {
         technique: technique.name().to_owned(),
         variant: variant_of(technique),
         settings: technique.settings(),
+        survives_camera,
     }
 }
 

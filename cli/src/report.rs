@@ -45,6 +45,8 @@ pub(crate) struct RunReport {
     pub(crate) features: Vec<String>,
     /// Every setting with its value.
     pub(crate) settings: Value,
+    /// Whether what was prepared still holds when only the camera moves.
+    pub(crate) survives_camera: bool,
     /// Milliseconds of each stage, `prepare.*` and `shade.*`.
     pub(crate) stages_ms: BTreeMap<String, f64>,
     /// Wall time of preparation; on the GPU from recording to the end of its work.
@@ -68,6 +70,7 @@ pub(crate) struct Subject {
     pub(crate) technique: String,
     pub(crate) variant: String,
     pub(crate) settings: Value,
+    pub(crate) survives_camera: bool,
 }
 
 impl RunReport {
@@ -84,6 +87,7 @@ impl RunReport {
             adapter,
             features: features.unwrap_or_default(),
             settings: subject.settings,
+            survives_camera: subject.survives_camera,
             stages_ms: report.stages_ms,
             prepare_ms,
             shade_ms,

@@ -176,7 +176,7 @@ pub(crate) fn text(comparison: &Comparison) -> String {
 }
 
 /// Rows in aligned columns, the first to the left, figures to the right.
-fn aligned<const N: usize>(lines: &[[String; N]]) -> String {
+pub(crate) fn aligned<const N: usize>(lines: &[[String; N]]) -> String {
     let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
     let widths: [usize; N] = std::array::from_fn(width);
     let mut text = String::new();

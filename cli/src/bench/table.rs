@@ -1,0 +1,132 @@
+//! `results.csv`, and the table for a terminal.
+
+use serde::Serialize;
+
+use super::front::{Error, Time, by_scene, pareto, places, rays_ms_at};
+use super::record::{Outcome, Record};
+use crate::compare::table::{aligned, error_text, milliseconds};
+use crate::error::CliError;
+
+/// A row of `results.csv`: a record without what JSON alone can hold.
+#[derive(Serialize)]
+struct CsvRow<'a> {
+    scene: &'a str,
+    axis: Option<&'static str>,
+    axis_value: Option<f64>,
+    light: &'a str,
+    width: u32,
+    height: u32,
+    triangles: usize,
+    penumbra: f64,
+    label: &'a str,
+    technique: &'a str,
+    variant: &'a str,
+    preset: &'a str,
+    backend: &'a str,
+    adapter: &'a str,
+    prepare_ms: Option<f64>,
+    prepare_spread_ms: Option<f64>,
+    shade_ms: Option<f64>,
+    shade_spread_ms: Option<f64>,
+    survives_camera: Option<bool>,
+    bytes: Option<u64>,
+    mae: Option<f64>,
+    rmse: Option<f64>,
+    p99: Option<f64>,
+    pen_rmse: Option<f64>,
+    truth_samples: u32,
+    truth_noise: f64,
+    seed: u64,
+    processor: &'a str,
+    threads: usize,
+    version: &'a str,
+    refused: &'a str,
+}
+
+/// `results.csv`.
+pub(crate) fn csv(records: &[Record]) -> Result<Vec<u8>, CliError> {
+    let encode =
+        |source: Box<dyn std::error::Error + Send + Sync>| CliError::Encode { what: "results.csv", source };
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for record in records {
+        let measured = record.measured();
+        let row = CsvRow {
+            scene: &record.scene,
+            axis: record.point.map(|point| point.axis.label()),
+            axis_value: record.point.map(|point| point.value),
+            light: &record.light,
+            width: record.width,
+            height: record.height,
+            triangles: record.triangles,
+            penumbra: record.penumbra,
+            label: &record.label,
+            technique: &record.technique,
+            variant: &record.variant,
+            preset: record.preset.as_deref().unwrap_or_default(),
+            backend: &record.backend,
+            adapter: record.adapter.as_deref().unwrap_or_default(),
+            prepare_ms: measured.map(|m| m.prepare_ms),
+            prepare_spread_ms: measured.map(|m| m.prepare_spread_ms),
+            shade_ms: measured.map(|m| m.shade_ms),
+            shade_spread_ms: measured.map(|m| m.shade_spread_ms),
+            survives_camera: measured.map(|m| m.survives_camera),
+            bytes: measured.map(|m| m.bytes),
+            mae: measured.map(|m| m.mae),
+            rmse: measured.map(|m| m.rmse),
+            p99: measured.map(|m| m.p99),
+            pen_rmse: measured.and_then(|m| m.pen_rmse),
+            truth_samples: record.truth_samples,
+            truth_noise: record.truth_noise,
+            seed: record.seed,
+            processor: &record.machine.processor,
+            threads: record.machine.threads,
+            version: &record.machine.version,
+            refused: match &record.outcome {
+                Outcome::Refused(why) => why,
+                Outcome::Measured(_) => "",
+            },
+        };
+        writer.serialize(row).map_err(|error| encode(error.into()))?;
+    }
+    writer.into_inner().map_err(|error| encode(error.to_string().into()))
+}
+
+/// The Pareto front of every scene, fastest first.
+pub(crate) fn fronts(records: &[Record]) -> String {
+    let mut text = String::new();
+    for (scene, records) in by_scene(records) {
+        let places = places(records.iter().copied(), Time::Whole, Error::Rmse);
+        let mut lines =
+            vec![["  nothing is both faster and closer than", "ms", "rmse", "rays / it"].map(str::to_owned)];
+        for place in pareto(&places) {
+            let rays = rays_ms_at(&places, place.error, true)
+                .filter(|_| !place.is_rays())
+                .map_or_else(|| "-".to_owned(), |ms| format!("{:.1}x", ms / place.ms));
+            lines.push([format!("  {}", place.name), milliseconds(place.ms), error_text(place.error), rays]);
+        }
+        text.push_str(&format!("{scene}\n{}\n", aligned(&lines)));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::record::tests::record;
+    use super::*;
+
+    #[test]
+    fn one_line_a_record_and_one_front_a_scene() {
+        let records = [
+            record("ball", "rays 4", 2.0, 0.1),
+            record("ball", "shadow-map hard", 1.0, 0.2),
+            record("quads", "rays 4", 2.0, 0.1),
+            record("quads", "shadow-map hard", 3.0, 0.2),
+        ];
+        let csv = String::from_utf8(csv(&records).unwrap()).unwrap();
+        assert_eq!(csv.lines().count(), 5);
+        assert!(csv.starts_with("scene,axis,axis_value,light,"));
+        let text = fronts(&records);
+        assert_eq!(text.matches("shadow-map hard").count(), 1, "{text}");
+        assert_eq!(text.matches("rays 4").count(), 2, "{text}");
+    }
+}
