@@ -315,7 +315,7 @@ pub(crate) mod tests {
         assert!(holds(&records, &a) && !holds(&records, &b));
         assert!(!records.holds(&a.key, &a.machine, 1, 1024), "another seed is another cell");
         records.add(b.clone()).unwrap();
-        assert_eq!(merge(&[folder.path().to_owned()]).unwrap(), [b.clone(), a.clone()]);
+        assert_eq!(merge(&[folder.path().to_owned()]).unwrap(), [b, a]);
         assert!(Records::open(folder.path(), true).unwrap().into_all().is_empty());
     }
 

@@ -1,4 +1,4 @@
-//! Ground truth that is traced once for a view and kept as NumPy files beside the results.
+//! Ground truth that is traced once for a view and kept as `NumPy` files beside the results.
 //!
 //! The name is a hash of all that V depends on: triangles, masks, camera, light, samples, seed and version. Files that do
 //! not fit are traced again.

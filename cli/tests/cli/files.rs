@@ -61,6 +61,7 @@ fn a_report_has_exactly_its_keys() {
             "shade_ms",
             "skipped",
             "stages_ms",
+            "survives_camera",
             "technique",
             "triangles",
             "variant",
