@@ -170,14 +170,14 @@ impl Records {
         let path = folder.join(FILE);
         let fault = |source| CliError::Write { path: path.clone(), source };
         fs::create_dir_all(folder).map_err(fault)?;
-        let by_key = if fresh || !path.exists() { BTreeMap::new() } else { read(&path)? };
-        // Written anew, so that a line cut short is gone before the next one follows it.
-        let mut text = Vec::new();
-        for record in by_key.values() {
-            text.extend(line(record)?);
+        let text = if fresh || !path.exists() { String::new() } else { load(&path)? };
+        // A line cut short is taken away before the next one follows it; whole lines stay as they are.
+        let whole = &text[..text.rfind('\n').map_or(0, |end| end + 1)];
+        let by_key = parse(&path, whole)?;
+        if fresh || whole.len() < text.len() {
+            write::bytes(&path, whole.as_bytes())?;
         }
-        write::bytes(&path, &text)?;
-        let file = OpenOptions::new().append(true).open(&path).map_err(fault)?;
+        let file = OpenOptions::new().create(true).append(true).open(&path).map_err(fault)?;
         Ok(Self { path, file, by_key })
     }
 
@@ -206,7 +206,8 @@ impl Records {
 pub(crate) fn merge(folders: &[PathBuf]) -> Result<Vec<Record>, CliError> {
     let mut by_key = BTreeMap::new();
     for folder in folders {
-        by_key.extend(read(&folder.join(FILE))?);
+        let path = folder.join(FILE);
+        by_key.extend(parse(&path, &load(&path)?)?);
     }
     Ok(by_key.into_values().collect())
 }
@@ -227,9 +228,12 @@ fn line(record: &Record) -> Result<Vec<u8>, CliError> {
     Ok(line)
 }
 
-fn read(path: &Path) -> Result<BTreeMap<String, Record>, CliError> {
-    let text =
-        fs::read_to_string(path).map_err(|source| CliError::ReadRecords { path: path.to_owned(), source })?;
+fn load(path: &Path) -> Result<String, CliError> {
+    fs::read_to_string(path).map_err(|source| CliError::ReadRecords { path: path.to_owned(), source })
+}
+
+/// The records in a file's text; of equal keys the last line's counts.
+fn parse(path: &Path, text: &str) -> Result<BTreeMap<String, Record>, CliError> {
     let mut by_key = BTreeMap::new();
     for (number, line) in text.split_inclusive('\n').enumerate() {
         // A line without its end was cut short: the cell is measured again.
