@@ -34,11 +34,7 @@ impl Kernel {
             }
             (Variant::Gaussian | Variant::MultiPass, _) => {
                 let sigma = if is_round { 0.5f32 } else { (1.0f32 / 3.0).sqrt() };
-                let mut kernel = if variant == Variant::Gaussian {
-                    Self::weighed(disk_points(taps, seed))
-                } else {
-                    Self::gaussian(taps, seed)
-                };
+                let mut kernel = Self::gaussian(taps, seed);
                 kernel.points.iter_mut().for_each(|point| *point *= 3.0 * sigma);
                 kernel.reach = 3.0 * sigma;
                 kernel
@@ -48,10 +44,7 @@ impl Kernel {
 
     /// Poisson points of the unit disk, weighed by a Gaussian of σ = ⅓.
     pub fn gaussian(taps: u32, seed: u32) -> Self {
-        Self::weighed(poisson_points(taps, seed))
-    }
-
-    fn weighed(points: Vec<Vec2>) -> Self {
+        let points = poisson_points(taps, seed);
         let weight = |point: &Vec2| (-4.5 * point.length_squared()).exp();
         let sum: f32 = points.iter().map(weight).sum();
         let weights = points.iter().map(|point| weight(point) / sum).collect();
