@@ -120,7 +120,7 @@ impl Lookup<'_> {
             // The plane holds the light's middle: half of the light is below it at best.
             return layout.share_above(receiver, normal);
         }
-        let visibility = window.read(at.texel, before, slope, self.bilinear);
+        let visibility = window.look_up(at.texel, before, slope, self.bilinear);
         visibility.min(layout.share_above(receiver, normal))
     }
 
@@ -133,7 +133,7 @@ impl Lookup<'_> {
             return 0.0;
         }
         self.locate(point)
-            .map_or(1.0, |(window, at)| window.read(at.texel, at.t, glam::Vec2::ZERO, self.bilinear))
+            .map_or(1.0, |(window, at)| window.look_up(at.texel, at.t, glam::Vec2::ZERO, self.bilinear))
     }
 
     #[inline]
@@ -145,7 +145,7 @@ impl Lookup<'_> {
 impl Window {
     /// V at a position on the window, at depth `t` there and `slope` more for every texel to the side.
     #[inline]
-    fn read(&self, texel: glam::Vec2, t: f32, slope: glam::Vec2, bilinear: bool) -> f32 {
+    fn look_up(&self, texel: glam::Vec2, t: f32, slope: glam::Vec2, bilinear: bool) -> f32 {
         let pixel = self.grid.from_texels(texel);
         // Far outside of the window, and for what is no number, there is nothing; the limit keeps the conversion below
         // from saturating.

@@ -12,7 +12,9 @@ use super::station::Axis;
 use crate::error::CliError;
 use crate::picture;
 
-const SIZE: (u32, u32) = (960, 600);
+const SIZE: (u32, u32) = (1180, 600);
+/// Where the key begins, right of the chart.
+const KEY: u32 = 930;
 /// Colours that are told apart with any kind of sight (Okabe and Ito's, darker where they are pale on white).
 const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
@@ -64,7 +66,7 @@ pub(crate) fn time_against_error(
 ) -> Result<Option<Chart>, CliError> {
     let mut series = rays(places);
     for (technique, points) in by_technique(places) {
-        let colour = COLOURS[series.len().saturating_sub(2) % COLOURS.len()];
+        let colour = colour_of(technique);
         series.push(Series { name: technique.to_owned(), points, colour, is_curve: false });
     }
     let front = pareto(places).iter().map(|p| (p.ms, p.error, p.name.clone())).collect();
@@ -88,12 +90,12 @@ pub(crate) fn memory_against_error(
             by_technique.entry(&record.technique).or_default().push(point);
         }
     }
-    let series = (0..)
-        .zip(by_technique)
-        .map(|(i, (name, points)): (usize, _)| Series {
+    let series = by_technique
+        .into_iter()
+        .map(|(name, points)| Series {
             name: name.to_owned(),
             points,
-            colour: if name == super::front::RAYS { RAYS_SKIPPING } else { COLOURS[i % COLOURS.len()] },
+            colour: colour_of(name),
             is_curve: false,
         })
         .collect();
@@ -114,15 +116,12 @@ pub(crate) fn cost_curve(axis: Axis, records: &[Record]) -> Result<Option<Chart>
         }
     }
     let Some(scene) = scene else { return Ok(None) };
-    let series = (0..)
-        .zip(curves)
-        .map(|(i, (name, mut points)): (usize, _)| {
+    let series = curves
+        .into_iter()
+        .map(|(name, mut points)| {
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let colour = match name.as_str() {
-                "rays 64" => RAYS_PLAIN,
-                "rays 64 skipping" => RAYS_SKIPPING,
-                _ => COLOURS[i % COLOURS.len()],
-            };
+            let technique = name.split([' ', '@']).next().unwrap_or_default();
+            let colour = if name == "rays 64" { RAYS_PLAIN } else { colour_of(technique) };
             Series { name, points, colour, is_curve: true }
         })
         .collect();
@@ -130,6 +129,12 @@ pub(crate) fn cost_curve(axis: Axis, records: &[Record]) -> Result<Option<Chart>
     let (x, y) = (axis.label().to_owned(), "milliseconds, prepare and shade".to_owned());
     let file = format!("cost-{}", format!("{axis:?}").to_lowercase());
     Drawing { title, x, y, series, front: Vec::new() }.chart(file)
+}
+
+/// A technique has its colour in every chart.
+fn colour_of(technique: &str) -> RGBColor {
+    let place = crate::techniques::all().iter().position(|factory| factory.name() == technique);
+    place.map_or(RAYS_SKIPPING, |place| COLOURS[place % COLOURS.len()])
 }
 
 fn rays(places: &[Place]) -> Vec<Series> {
@@ -196,7 +201,8 @@ impl Drawing {
         register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
             .map_err(|_| CliError::Chart("its font cannot be read".to_owned()))?;
         area.fill(&WHITE).map_err(|e| fault(&e))?;
-        let mut chart = ChartBuilder::on(area)
+        let (left, key) = area.split_horizontally(KEY);
+        let mut chart = ChartBuilder::on(&left)
             .margin(14)
             .caption(&self.title, ("sans-serif", 22))
             .x_label_area_size(46)
@@ -222,11 +228,7 @@ impl Drawing {
                 chart.draw_series(line).map_err(|e| fault(&e))?;
             }
             let dots = series.points.iter().map(|&point| Circle::new(point, 4, colour.filled()));
-            chart
-                .draw_series(dots)
-                .map_err(|e| fault(&e))?
-                .label(&series.name)
-                .legend(move |(x, y)| Circle::new((x + 9, y), 4, colour.filled()));
+            chart.draw_series(dots).map_err(|e| fault(&e))?;
         }
         let steps: Vec<(f64, f64)> = self.steps(x1);
         chart.draw_series(LineSeries::new(steps, BLACK.mix(0.35).stroke_width(1))).map_err(|e| fault(&e))?;
@@ -236,14 +238,12 @@ impl Drawing {
             EmptyElement::at((*x, *y)) + Text::new(name.clone(), (9, -16), ("sans-serif", 14))
         });
         chart.draw_series(names).map_err(|e| fault(&e))?;
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::LowerLeft)
-            .label_font(("sans-serif", 15))
-            .background_style(WHITE.mix(0.85))
-            .border_style(RGBColor(200, 200, 200))
-            .draw()
-            .map_err(|e| fault(&e))?;
+        let named = self.series.iter().filter(|series| !series.points.is_empty());
+        for (row, series) in (0..).zip(named) {
+            let y = 60 + 24 * row;
+            key.draw(&Circle::new((12, y + 8), 4, series.colour.filled())).map_err(|e| fault(&e))?;
+            key.draw(&Text::new(series.name.clone(), (24, y), ("sans-serif", 15))).map_err(|e| fault(&e))?;
+        }
         drop(chart);
         area.present().map_err(|e| fault(&e))
     }
