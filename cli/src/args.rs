@@ -65,6 +65,8 @@ pub(crate) enum Command {
     Reference(ReferenceArgs),
     /// Run time against error over every technique, variant and preset: charts, tables, HTML page
     Bench(BenchArgs),
+    /// Every technique on scenes that are hard on numbers; exit code 1 if one fails
+    Stress(StressArgs),
     /// Techniques with their settings, units, ranges, defaults and presets
     Techniques(TechniquesArgs),
     /// Built-in scenes and their parameters
@@ -269,6 +271,39 @@ pub(crate) struct BenchArgs {
     /// Folder to write to, and to go on in
     #[arg(long, value_name = "DIR", default_value = "out/bench")]
     pub(crate) out: PathBuf,
+}
+
+/// `gnomon stress`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  gnomon stress --quick
+  gnomon stress --variants --backend cpu,gpu
+  gnomon stress --techniques psm --json
+
+Scenes are scaled (1e-3 to 1e4), moved (to 1e4 of their size) and cut into other triangles, none of which may change the \
+image: their error may exceed that of the scene as it was by what moving shadows by half a pixel would add. Lights at \
+the horizon, in the camera's plane, on faces and vertices, without size and huge, near planes through geometry, images \
+of one row, empty and broken geometry have no such twin: V has to be finite and in [0, 1].")]
+pub(crate) struct StressArgs {
+    /// Techniques, separated by commas; NAME@PRESET takes a preset [default: all]
+    #[arg(long, value_name = "A,B", value_delimiter = ',')]
+    pub(crate) techniques: Vec<String>,
+    /// Every variant of each technique, not its default one alone
+    #[arg(long)]
+    pub(crate) variants: bool,
+    /// One scene in place of four, and no large one
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Where techniques run; cpu,gpu tries both
+    #[arg(long, value_enum, value_name = "BACKEND", value_delimiter = ',', default_value = "cpu")]
+    pub(crate) backend: Vec<Backend>,
+    /// Shadow rays a pixel of ground truth
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    pub(crate) samples: u32,
+    /// Seed of all random choices
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
 }
 
 /// `gnomon techniques`.

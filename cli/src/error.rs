@@ -20,6 +20,8 @@ use crate::scene_source::SceneSourceError;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Exit(u8);
 
+/// A check failed.
+const FAILED: Exit = Exit(1);
 /// Bad usage or input.
 pub(crate) const BAD_INPUT: Exit = Exit(2);
 /// A GPU was required and there is none.
@@ -87,6 +89,10 @@ pub(crate) enum CliError {
         #[source]
         source: serde_json::Error,
     },
+    #[error("{0}")]
+    CheckFailed(String),
+    #[error("a trial cannot be built: {0}")]
+    Trial(String),
     #[error("cannot draw a chart: {0}")]
     Chart(String),
     #[error("cannot write {}", path.display())]
@@ -106,6 +112,7 @@ impl CliError {
     fn exit(&self) -> Exit {
         match self {
             Self::Stdout(error) if error.kind() == io::ErrorKind::BrokenPipe => QUIET,
+            Self::CheckFailed(_) => FAILED,
             Self::NoGpuPath { .. } => NO_GPU,
             #[cfg(feature = "gpu")]
             Self::Gpu(error) => exit_of_gpu(error),

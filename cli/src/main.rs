@@ -17,6 +17,7 @@ mod output;
 mod picture;
 mod report;
 mod scene_source;
+mod stress;
 mod techniques;
 
 use std::process::ExitCode;
@@ -55,6 +56,7 @@ fn run(arguments: &Arguments) -> Result<(), CliError> {
         Command::Render(arguments) => commands::render::run(arguments, &console),
         Command::Reference(arguments) => commands::reference::run(arguments, &console),
         Command::Bench(arguments) => commands::bench::run(arguments, &console),
+        Command::Stress(arguments) => commands::stress::run(arguments, &console),
         Command::Techniques(arguments) => commands::techniques::run(arguments, &console),
         Command::Scenes => commands::scenes::run(&console),
     }

@@ -5,4 +5,5 @@ pub(crate) mod compare;
 pub(crate) mod reference;
 pub(crate) mod render;
 pub(crate) mod scenes;
+pub(crate) mod stress;
 pub(crate) mod techniques;

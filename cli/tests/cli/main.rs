@@ -8,4 +8,5 @@ mod files;
 mod help;
 mod listings;
 mod streams;
+mod stress;
 mod workbench;
