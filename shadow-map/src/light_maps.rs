@@ -77,11 +77,9 @@ impl<'a> LightMaps<'a> {
         choose: impl FnOnce(&Backdrops<'a>, &[LightView], &mut Report) -> Option<RelevantCasters>,
     ) -> Self {
         let tolerance = plane_tolerance(scene.bounds(), light);
-        // A filter looks from a face without casters into those beside it.
-        let skip_faces = params.skip && params.reach_texels() == Some(0.0);
         let (casters, views) = report.time("prepare.views", |_| {
             let casters = relevance::told_apart(scene, light, tolerance);
-            let views = light_views::light_views(scene, light, &casters.drawn, skip_faces);
+            let views = light_views::light_views(scene, light, &casters.drawn, params.skips_faces());
             (casters, views)
         });
         report.skip("casters", casters.backdrops.len() as u64);

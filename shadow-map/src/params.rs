@@ -55,7 +55,7 @@ impl Variant {
 
     /// Whether it runs on a GPU, too.
     pub fn has_gpu_path(self) -> bool {
-        matches!(self, Self::Hard)
+        matches!(self, Self::Hard | Self::Pcf | Self::ObjectId)
     }
 
     /// The name in settings and reports.
@@ -138,6 +138,11 @@ impl ShadowMapParams {
     const PCSS: Self = Self { variant: Variant::Pcss, ..Self::DEFAULT };
     const MOMENTS: Self = Self { variant: Variant::Moments, ..Self::DEFAULT };
     const OBJECT_ID: Self = Self { variant: Variant::ObjectId, ..Self::DEFAULT };
+
+    /// Whether cube faces without casters may be left out: a filter looks from them into those beside.
+    pub(crate) fn skips_faces(&self) -> bool {
+        self.skip && self.reach_texels() == Some(0.0)
+    }
 
     /// How many texels beside a receiver's own its lookup reads at most; `None` if that depends on more than the
     /// settings.

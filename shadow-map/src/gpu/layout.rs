@@ -4,6 +4,8 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3};
 
 use crate::light_views::{LightView, Unprojection};
+use crate::poisson_disk::poisson_disk;
+use crate::{Kernel, ShadowMapParams, Variant};
 
 /// `LightView` of `light_views.wesl`.
 #[repr(C)]
@@ -60,12 +62,47 @@ pub struct MapsUniform {
     pub tolerance: f32,
 }
 
+/// `Filter` of `pcf.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct FilterUniform {
+    /// Texels a side of the grid; 0 for the disk.
+    pub side: i32,
+    /// Offsets of the disk.
+    pub taps: u32,
+    /// What a pixel's angle is drawn from.
+    pub seed: u32,
+    /// 1 where a caster's object is asked and not whether it is near.
+    pub by_object: u32,
+    /// In texels: as many as the setting `taps` may have.
+    pub offsets: [[f32; 2]; 1024],
+}
+
+impl FilterUniform {
+    /// The filter of these settings.
+    pub fn new(params: &ShadowMapParams) -> Self {
+        let mut filter = Self { seed: params.seed, ..Zeroable::zeroed() };
+        filter.by_object = u32::from(params.variant == Variant::ObjectId);
+        match params.kernel {
+            Kernel::Grid => filter.side = params.filter as i32,
+            Kernel::PoissonDisk => {
+                filter.taps = params.taps.min(filter.offsets.len() as u32);
+                let radius = params.filter as f32 * 0.5;
+                for (offset, point) in filter.offsets.iter_mut().zip(poisson_disk(filter.taps, params.seed)) {
+                    *offset = (point * radius).to_array();
+                }
+            }
+        }
+        filter
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use scene_core::assert_layout;
 
     use super::*;
-    use crate::gpu::shaders::HARD;
+    use crate::gpu::shaders::{HARD, PCF};
 
     #[test]
     fn layouts_are_those_of_the_shaders() {
@@ -76,5 +113,6 @@ mod tests {
             [projection_from_world, origin, near, x, half_diagonal, y, z]
         );
         assert_layout!(MapsUniform, HARD, "Maps", [count, tolerance]);
+        assert_layout!(FilterUniform, PCF, "Filter", [side, taps, seed, by_object, offsets]);
     }
 }

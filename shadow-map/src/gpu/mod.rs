@@ -1,7 +1,8 @@
 //! The GPU path: the stages of [`cpu`](crate::cpu) under the same names, recorded into the caller's encoder.
 //!
 //! `prepare.views` is the CPU's own code. `prepare.maps` draws the casters, the nearest triangle a texel, into a layer
-//! a view. `shade.lookup` asks the questions of [`receiver_plane`](crate::receiver_plane) in one full-screen pass.
+//! a view. `shade.lookup` asks the questions of [`receiver_plane`](crate::receiver_plane) in one full-screen pass, of one
+//! texel for `hard`; `shade.filter` those of [`taps`](crate::taps), of as many as the filter has for `pcf` and `object-id`.
 //!
 //! `view_dependent` is not asked here: all casters are drawn, which costs time and changes no pixel.
 //!
@@ -20,10 +21,10 @@ use scene_core::gpu::{
 use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Report, relevance};
 
-use crate::ShadowMapParams;
 use crate::light_views::{LightView, light_views};
 use crate::receiver_plane::plane_tolerance;
-use layout::{MapsUniform, ViewUniform};
+use crate::{ShadowMapParams, Variant};
+use layout::{FilterUniform, MapsUniform, ViewUniform};
 
 /// The technique on one device: pipelines, and the maps of the light prepared last.
 #[derive(Debug)]
@@ -33,11 +34,21 @@ pub struct ShadowMapOnGpu {
     layers: DepthLayers,
     maps: HeldBuffer,
     views: HeldBuffer,
+    /// What filters read beside the maps; `hard` has none.
+    filter: Option<FilterBuffers>,
     own: HeldGroup,
     scene: SceneBindings,
     receivers: Receivers,
     lookup: VisibilityPass,
     prepared: Option<Prepared>,
+}
+
+/// Settings of the filter, and the triangles of each object.
+#[derive(Debug)]
+struct FilterBuffers {
+    settings: FilterUniform,
+    uniform: HeldBuffer,
+    objects: HeldBuffer,
 }
 
 /// What `prepare` leaves to `shade`.
@@ -51,7 +62,7 @@ impl ShadowMapOnGpu {
     /// Makes the pipelines. `visibility` is the format of the texture that V is written to.
     ///
     /// # Errors
-    /// A `map_size` that the device has no texture of.
+    /// A `map_size` that the device has no texture of; a variant or number of taps that has no GPU path.
     pub fn new(
         device: &wgpu::Device,
         params: ShadowMapParams,
@@ -62,17 +73,36 @@ impl ShadowMapOnGpu {
             params.map_size,
             device.limits().max_texture_dimension_2d,
         )?;
+        if !params.variant.has_gpu_path() {
+            return Err(TechniqueError::Unsupported {
+                technique: ShadowMapParams::TECHNIQUE,
+                input: format!("variant={} on a GPU", params.variant.name()),
+                why: "this variant has a CPU path only".to_owned(),
+            });
+        }
         let stages = wgpu::ShaderStages::FRAGMENT;
-        let types = [binding::UNIFORM, binding::STORAGE, binding::ID_LAYERS];
+        let mut types = vec![binding::UNIFORM, binding::STORAGE, binding::ID_LAYERS];
+        let filter = (params.variant != Variant::Hard).then(|| {
+            types.extend([binding::UNIFORM, binding::STORAGE]);
+            FilterBuffers {
+                settings: FilterUniform::new(&params),
+                uniform: HeldBuffer::uniform("filter"),
+                objects: HeldBuffer::storage("triangles of objects"),
+            }
+        });
+        let (label, wgsl, fragment) = match params.variant {
+            Variant::Hard => ("shadow-map hard", shaders::HARD, "shade_hard"),
+            _ => ("shadow-map pcf", shaders::PCF, "shade_pcf"),
+        };
         let own = HeldGroup::new(device, "shadow maps", stages, &types);
         let scene = SceneBindings::new(device, stages);
         let receivers = Receivers::new(device);
         let lookup = VisibilityPass::new(
             device,
             &VisibilityPassParts {
-                label: "shadow-map hard",
-                wgsl: shaders::HARD,
-                fragment: "shade_hard",
+                label,
+                wgsl,
+                fragment,
                 own: own.layout(),
                 scene: &scene,
                 receivers: &receivers,
@@ -85,6 +115,7 @@ impl ShadowMapOnGpu {
             layers: DepthLayers::new(DepthIds::Triangle),
             maps: HeldBuffer::uniform("maps"),
             views: HeldBuffer::storage("views of the light"),
+            filter,
             own,
             scene,
             receivers,
@@ -110,7 +141,7 @@ impl ShadowMapOnGpu {
         let tolerance = plane_tolerance(geometry.bounds(), query.light);
         let (casters, views) = report.time("prepare.views", |_| {
             let casters = relevance::told_apart(&geometry, query.light, tolerance);
-            let views = light_views(&geometry, query.light, &casters.drawn, self.params.skip);
+            let views = light_views(&geometry, query.light, &casters.drawn, self.params.skips_faces());
             (casters, views)
         });
         report.skip("casters", casters.backdrops.len() as u64);
@@ -136,7 +167,21 @@ impl ShadowMapOnGpu {
         let views = self.views.get(device, bytemuck::cast_slice(&uniforms));
         self.prepared = None;
         if let Some(ids) = self.layers.bound_ids() {
-            let own = self.own.get(device, &[maps.into(), views.into(), ids]);
+            let mut bound = vec![maps.into(), views.into(), ids];
+            if let Some(filter) = &mut self.filter {
+                let mut objects: Vec<[u32; 2]> = query
+                    .scene
+                    .objects
+                    .iter()
+                    .map(|object| [object.triangles.start, object.triangles.end])
+                    .collect();
+                if objects.is_empty() {
+                    objects.push([0; 2]);
+                }
+                bound.push(filter.uniform.get(device, bytemuck::bytes_of(&filter.settings)).into());
+                bound.push(filter.objects.get(device, bytemuck::cast_slice(&objects)).into());
+            }
+            let own = self.own.get(device, &bound);
             self.prepared = Some(Prepared { own, scene: self.scene.groups(device, &query.scene) });
         }
         self.receivers.prepare(device, query);
@@ -158,7 +203,7 @@ impl ShadowMapOnGpu {
         Ok(())
     }
 
-    /// `shade.lookup`: records the pass that writes V of every pixel, 1 where nothing is seen.
+    /// `shade.lookup` or `shade.filter`: records the pass that writes V of every pixel, 1 where nothing is seen.
     ///
     /// # Errors
     /// [`TechniqueError::NotPrepared`].
@@ -172,7 +217,8 @@ impl ShadowMapOnGpu {
         let not_prepared = || TechniqueError::NotPrepared { technique: ShadowMapParams::TECHNIQUE };
         let prepared = self.prepared.as_ref().ok_or_else(not_prepared)?;
         let receivers = self.receivers.group(recorder.device, camera, gbuffer).ok_or_else(not_prepared)?;
-        self.lookup.record(recorder, "shade.lookup", &prepared.own, &prepared.scene, &receivers, visibility);
+        let stage = if self.filter.is_some() { "shade.filter" } else { "shade.lookup" };
+        self.lookup.record(recorder, stage, &prepared.own, &prepared.scene, &receivers, visibility);
         Ok(Report { bytes: self.layers.bytes(), ..Default::default() })
     }
 
