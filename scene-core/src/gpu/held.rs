@@ -23,14 +23,15 @@ impl HeldBuffer {
         Self { label, usage: wgpu::BufferUsages::STORAGE, held: None }
     }
 
-    /// A buffer that holds `contents`, which must not be empty: the one of the last call if that held the same.
+    /// A buffer that holds `contents`: the one of the last call if that held the same. For none it holds 256 bytes of zeros,
+    /// more than an element of any table, since a binding must not be empty.
     pub fn get(&mut self, device: &wgpu::Device, contents: &[u8]) -> wgpu::Buffer {
         if let Some((_, buffer)) = self.held.as_ref().filter(|(held, _)| held == contents) {
             return buffer.clone();
         }
         let buffer = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some(self.label),
-            contents,
+            contents: if contents.is_empty() { &[0; 256] } else { contents },
             usage: self.usage,
         });
         self.held = Some((contents.to_vec(), buffer.clone()));

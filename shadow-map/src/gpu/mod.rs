@@ -158,26 +158,19 @@ impl ShadowMapOnGpu {
 
         let device = recorder.device;
         let maps = MapsUniform { count: views.views.len() as u32, tolerance };
-        let mut uniforms: Vec<_> = views.views.iter().map(ViewUniform::new).collect();
-        if uniforms.is_empty() {
-            // A binding must not be empty.
-            uniforms.push(bytemuck::Zeroable::zeroed());
-        }
+        let uniforms: Vec<_> = views.views.iter().map(ViewUniform::new).collect();
         let maps = self.maps.get(device, bytemuck::bytes_of(&maps));
         let views = self.views.get(device, bytemuck::cast_slice(&uniforms));
         self.prepared = None;
         if let Some(ids) = self.layers.bound_ids() {
             let mut bound = vec![maps.into(), views.into(), ids];
             if let Some(filter) = &mut self.filter {
-                let mut objects: Vec<[u32; 2]> = query
+                let objects: Vec<[u32; 2]> = query
                     .scene
                     .objects
                     .iter()
                     .map(|object| [object.triangles.start, object.triangles.end])
                     .collect();
-                if objects.is_empty() {
-                    objects.push([0; 2]);
-                }
                 bound.push(filter.uniform.get(device, bytemuck::bytes_of(&filter.settings)).into());
                 bound.push(filter.objects.get(device, bytemuck::cast_slice(&objects)).into());
             }
