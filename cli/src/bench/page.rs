@@ -50,6 +50,7 @@ pub(crate) fn page(records: &[Record], folder: &Path) -> Result<Page, CliError> 
     let values = [
         ("version", env!("CARGO_PKG_VERSION")),
         ("css", &css),
+        ("sort", crate::compare::page::SORT),
         ("machines", &machines),
         ("overall", &overall),
         ("curves", &curves),

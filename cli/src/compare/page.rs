@@ -15,6 +15,9 @@ use crate::error::{CliError, count_of};
 use crate::picture;
 use crate::picture::error_map::diverging;
 
+/// The script that sorts tables by their headings, for every page that has some.
+pub(crate) const SORT: &str = include_str!("page/sort.js");
+
 /// Writes the page.
 pub(crate) fn page(comparison: &Comparison) -> Result<Vec<u8>, CliError> {
     let truth = &comparison.truth;
@@ -24,6 +27,7 @@ pub(crate) fn page(comparison: &Comparison) -> Result<Vec<u8>, CliError> {
         ("scene", escape(&truth.report.scene)),
         ("css", css),
         ("js", include_str!("page/page.js").to_owned()),
+        ("sort", SORT.to_owned()),
         ("facts", facts(comparison)),
         ("valid", thousands(truth.valid)),
         ("thead", table_head()),
