@@ -79,3 +79,20 @@ pub(crate) fn side(technique: &dyn ShadowTechnique, backend: Backend, has_gpu: b
         Backend::Auto => Some(Side::Cpu),
     }
 }
+
+/// The different sides that `backends` come down to, each with the first backend that asks for it; `None` stands for a
+/// GPU path that is required and not there.
+pub(crate) fn sides(
+    technique: &dyn ShadowTechnique,
+    backends: &[Backend],
+    has_gpu: bool,
+) -> Vec<(Backend, Option<Side>)> {
+    let mut sides: Vec<(Backend, Option<Side>)> = Vec::new();
+    for &backend in backends {
+        let side = side(technique, backend, has_gpu);
+        if !sides.iter().any(|(_, known)| *known == side) {
+            sides.push((backend, side));
+        }
+    }
+    sides
+}

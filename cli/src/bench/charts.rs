@@ -139,8 +139,8 @@ fn colour_of(technique: &str) -> RGBColor {
 
 fn rays(places: &[Place]) -> Vec<Series> {
     let of = |skipping: bool| {
-        let is_of = |p: &&Place| p.is_rays() && p.name.contains("skipping") == skipping;
-        let mut points: Vec<_> = places.iter().filter(is_of).map(|p| (p.ms, p.error)).collect();
+        let mut points: Vec<_> =
+            places.iter().filter(|place| place.is_rays_with(skipping)).map(|p| (p.ms, p.error)).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         points
     };
@@ -168,6 +168,9 @@ impl Drawing {
     /// Draws it twice; none if it has no points.
     fn chart(self, file: String) -> Result<Option<Chart>, CliError> {
         let Some(ranges) = self.ranges() else { return Ok(None) };
+        // Kept by the library for the whole process; giving the same bytes again changes nothing.
+        register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
+            .map_err(|_| CliError::Chart("its font cannot be read".to_owned()))?;
         let mut svg = String::new();
         self.draw(&SVGBackend::with_string(&mut svg, SIZE).into_drawing_area(), ranges)?;
         let mut pixels = vec![0; SIZE.0 as usize * SIZE.1 as usize * 3];
@@ -197,9 +200,6 @@ impl Drawing {
         [(x0, x1), (y0, y1)]: [(f64, f64); 2],
     ) -> Result<(), CliError> {
         let fault = |error: &dyn std::fmt::Display| CliError::Chart(error.to_string());
-        // Kept by the library for the whole process; giving the same bytes again changes nothing.
-        register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
-            .map_err(|_| CliError::Chart("its font cannot be read".to_owned()))?;
         area.fill(&WHITE).map_err(|e| fault(&e))?;
         let (left, key) = area.split_horizontally(KEY);
         let mut chart = ChartBuilder::on(&left)

@@ -80,13 +80,21 @@ pub(crate) fn all(names: &[String], seed: u64) -> Result<Vec<Contender>, CliErro
 fn rays() -> impl Iterator<Item = Contender> {
     [false, true].into_iter().flat_map(|skip| {
         RAYS.into_iter().map(move |samples| Contender {
-            label: format!("rays {samples}{}", if skip { " skipping" } else { "" }),
+            label: format!("{} {}", super::front::RAYS, rays_variant(samples, skip)),
             preset: None,
             is_default: samples == 64,
             kind: Kind::Rays { samples, skip },
         })
     })
 }
+
+/// What a row of ray tracing is called behind its technique.
+pub(crate) fn rays_variant(samples: u32, skip: bool) -> String {
+    format!("{samples}{}", if skip { SKIPPING } else { "" })
+}
+
+/// The end of the name of rows that leave proved rays out.
+pub(crate) const SKIPPING: &str = " skipping";
 
 impl Contender {
     /// The contender with another `map_size`, if it has maps.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::contender::SKIPPING;
 use super::record::{Measured, Record};
 
 /// Which time counts.
@@ -61,6 +62,11 @@ impl Place {
     pub(crate) fn is_rays(&self) -> bool {
         self.technique == RAYS
     }
+
+    /// Whether it is a row of ray tracing with, or else without, proofs that leave rays out.
+    pub(crate) fn is_rays_with(&self, skipping: bool) -> bool {
+        self.is_rays() && self.name.ends_with(SKIPPING) == skipping
+    }
 }
 
 /// What rows of ray tracing are called.
@@ -119,7 +125,7 @@ pub(crate) fn pareto(places: &[Place]) -> Vec<&Place> {
 pub(crate) fn rays_ms_at(places: &[Place], error: f64, skipping: bool) -> Option<f64> {
     let mut rows: Vec<(f64, f64)> = places
         .iter()
-        .filter(|place| place.is_rays() && place.name.contains("skipping") == skipping)
+        .filter(|place| place.is_rays_with(skipping))
         .map(|place| (place.error.ln(), place.ms.ln()))
         .collect();
     rows.sort_by(|a, b| b.0.total_cmp(&a.0));

@@ -11,9 +11,10 @@ use scene_core::technique::TechniqueError;
 use scene_core::{GBuffer, Report, scenes};
 use serde_json::json;
 
-use crate::args::{Backend, BenchArgs, TruthArgs};
+use crate::args::{BenchArgs, TruthArgs};
 use crate::backend::{self, Side};
 use crate::bench::contender::{self, Contender, Kind};
+use crate::bench::front::RAYS;
 use crate::bench::machine::Machine;
 use crate::bench::record::{self, Measured, Outcome, Record, Records};
 use crate::bench::station::{self, Station};
@@ -134,19 +135,17 @@ fn cells(
                 None => continue,
             },
         };
-        let mut sides: Vec<Side> = Vec::new();
-        for &backend in &args.backend {
-            let side = match &contender.kind {
-                Kind::Rays { .. } => {
-                    (backend != Backend::Gpu || args.backend.len() == 1).then_some(Side::Cpu)
-                }
-                Kind::Technique(technique) => backend::side(technique.as_ref(), backend, has_gpu),
-            };
-            if let Some(side) = side.filter(|side| !sides.contains(side)) {
-                sides.push(side);
-                let key = format!("{} {} {}", station.name(), contender.label, side.name());
-                cells.push(Cell { key, contender: contender.clone(), side });
+        let sides = match &contender.kind {
+            // The one backend that rays have; measured where the GPU alone is asked for, too.
+            Kind::Rays { .. } => vec![Side::Cpu],
+            Kind::Technique(technique) => {
+                let sides = backend::sides(technique.as_ref(), &args.backend, has_gpu);
+                sides.into_iter().filter_map(|(_, side)| side).collect()
             }
+        };
+        for side in sides {
+            let key = format!("{} {} {}", station.name(), contender.label, side.name());
+            cells.push(Cell { key, contender: contender.clone(), side });
         }
     }
     Ok(cells)
@@ -205,9 +204,7 @@ impl<'a> Site<'a> {
             Kind::Technique(technique) => {
                 (technique.name().to_owned(), crate::techniques::variant_of(technique.as_ref()))
             }
-            Kind::Rays { samples, skip } => {
-                ("rays".to_owned(), format!("{samples}{}", if *skip { " skipping" } else { "" }))
-            }
+            Kind::Rays { samples, skip } => (RAYS.to_owned(), contender::rays_variant(*samples, *skip)),
         };
         let (outcome, settings, adapter) = match repeated {
             Ok(repeated) => {
@@ -272,8 +269,8 @@ impl<'a> Site<'a> {
         report.skip("wholly lit pixels", traced.work.proved_lit);
         report.skip("wholly dark pixels", traced.work.proved_dark);
         let subject = Subject {
-            technique: "rays".to_owned(),
-            variant: samples.to_string(),
+            technique: RAYS.to_owned(),
+            variant: contender::rays_variant(samples, skip),
             settings: json!({ "samples": samples, "skip": skip }),
             survives_camera: true,
         };

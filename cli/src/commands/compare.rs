@@ -94,14 +94,9 @@ fn plan(chosen: Vec<Chosen>, backends: &[Backend], has_gpu: bool) -> Result<Vec<
     let mut plan: Vec<Planned> = Vec::new();
     for Chosen { label, technique } in chosen {
         let technique: Rc<dyn ShadowTechnique> = Rc::from(technique);
-        let first = plan.len();
-        for &backend in backends {
-            let side = backend::side(technique.as_ref(), backend, has_gpu);
-            let is_known = plan[first..].iter().any(|planned| planned.side == side);
-            if !is_known {
-                let label = if side == Some(Side::Cpu) { label.clone() } else { format!("{label} (gpu)") };
-                plan.push(Planned { label, technique: Rc::clone(&technique), backend, side });
-            }
+        for (backend, side) in backend::sides(technique.as_ref(), backends, has_gpu) {
+            let label = if side == Some(Side::Cpu) { label.clone() } else { format!("{label} (gpu)") };
+            plan.push(Planned { label, technique: Rc::clone(&technique), backend, side });
         }
     }
     match plan.first() {

@@ -49,12 +49,8 @@ pub(crate) fn run(args: &StressArgs, console: &Console) -> Result<(), CliError> 
         let (truth, _) = ground_truth::trace(view, &gbuffer, &truth_args, args.seed, console)?;
         let mut stand = Stand::new(view, &gbuffer, gpu.as_ref());
         for chosen in &chosen {
-            let mut sides = Vec::new();
-            for &backend in &args.backend {
-                let side = backend::side(chosen.technique.as_ref(), backend, gpu.is_some());
-                sides.extend(side.filter(|side| !sides.contains(side)));
-            }
-            for side in sides {
+            let sides = backend::sides(chosen.technique.as_ref(), &args.backend, gpu.is_some());
+            for side in sides.into_iter().filter_map(|(_, side)| side) {
                 let repeats = Repeats { runs: 1, budget_ms: 0.0 };
                 let key = |trial: &str| (trial.to_owned(), chosen.label.clone(), side.name());
                 let base = trial.same_as.as_ref().and_then(|base| base_rmse.get(&key(base)).copied());
