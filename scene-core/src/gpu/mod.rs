@@ -9,6 +9,7 @@
 //! | [`layers`] | depth maps as layers of one texture |
 //! | [`receivers`] | camera, light and G-buffer, as shaders read them |
 //! | [`visibility`] | the full-screen pass that writes V |
+//! | [`compute`] | compute passes and the buffers they write |
 //! | [`layout`] | uniforms of cameras and lights |
 //! | [`held`] | buffers and bind groups kept from frame to frame |
 //! | [`timing`] | the recorder, time per stage |
@@ -29,6 +30,7 @@
 //! 2 its cut-outs, 3 the receivers and the light.
 
 pub mod adapter;
+pub mod compute;
 pub mod depth;
 mod error;
 pub mod gbuffer;
@@ -47,6 +49,7 @@ pub mod timing;
 pub mod visibility;
 
 pub use adapter::Gpu;
+pub use compute::{ComputePass, WorkBuffer};
 pub use depth::{DepthIds, DepthPass, DepthTarget, WrittenProjection};
 pub use error::GpuError;
 pub use gbuffer::{GBufferPass, GBufferTargets, GpuGBuffer};
@@ -55,7 +58,7 @@ pub use held::{Bound, HeldBuffer, HeldGroup, binding};
 pub use layers::DepthLayers;
 pub use layout::{CameraUniform, DepthUniform, LightUniform};
 pub use receivers::Receivers;
-pub use scene::{GpuCutouts, GpuObject, GpuScene, SceneBindings, SceneBuffers, SceneGroups};
+pub use scene::{GpuCutouts, GpuObject, GpuScene, SceneBindings, SceneBuffers, SceneGroups, SceneHandles};
 pub use technique::{GpuShadowQuery, GpuShadowTechnique};
 pub use timing::{Recorder, StageSpan, StageTimer};
 pub use visibility::{VisibilityPass, VisibilityPassParts};

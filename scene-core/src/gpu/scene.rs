@@ -76,6 +76,42 @@ impl GpuScene<'_> {
     }
 }
 
+/// The buffers and objects of a [`GpuScene`] without the geometry in memory, to be kept from `prepare` to `shade`: buffers are
+/// handles, and cloning them copies nothing.
+#[derive(Clone, Debug)]
+pub struct SceneHandles {
+    positions: wgpu::Buffer,
+    triangles: wgpu::Buffer,
+    cutouts: Option<[wgpu::Buffer; 2]>,
+    objects: Vec<GpuObject>,
+    bounds: Aabb,
+}
+
+impl SceneHandles {
+    /// Those of `scene`.
+    pub fn new(scene: &GpuScene<'_>) -> Self {
+        Self {
+            positions: scene.positions.clone(),
+            triangles: scene.triangles.clone(),
+            cutouts: scene.cutouts.map(|cutouts| [cutouts.uvs.clone(), cutouts.masks.clone()]),
+            objects: scene.objects.to_vec(),
+            bounds: scene.bounds,
+        }
+    }
+
+    /// The scene, to be drawn.
+    pub fn view(&self) -> GpuScene<'_> {
+        GpuScene {
+            positions: &self.positions,
+            triangles: &self.triangles,
+            objects: &self.objects,
+            bounds: self.bounds,
+            cutouts: self.cutouts.as_ref().map(|[uvs, masks]| GpuCutouts { uvs, masks }),
+            geometry: None,
+        }
+    }
+}
+
 /// The faces of a box.
 fn box_mesh(bounds: Aabb) -> TriangleMesh {
     // Bit 0 of a corner is x, bit 1 y, bit 2 z.
@@ -86,13 +122,7 @@ fn box_mesh(bounds: Aabb) -> TriangleMesh {
 
 /// A [`Scene`] uploaded: owns the buffers that a [`GpuScene`] borrows.
 #[derive(Debug)]
-pub struct SceneBuffers {
-    positions: wgpu::Buffer,
-    triangles: wgpu::Buffer,
-    cutouts: Option<[wgpu::Buffer; 2]>,
-    objects: Vec<GpuObject>,
-    bounds: Aabb,
-}
+pub struct SceneBuffers(SceneHandles);
 
 impl SceneBuffers {
     /// Copies `scene` to `device`.
@@ -136,25 +166,19 @@ impl SceneBuffers {
             flags: object.flags,
             has_mask: object.alpha.is_some(),
         });
-        Ok(Self { positions, triangles, cutouts, objects: objects.collect(), bounds: scene.bounds() })
+        let (objects, bounds) = (objects.collect(), scene.bounds());
+        Ok(Self(SceneHandles { positions, triangles, cutouts, objects, bounds }))
     }
 
     /// What techniques are given. `geometry` is the scene this was made from, if it is still there.
     pub fn view<'a>(&'a self, geometry: Option<&'a Scene>) -> GpuScene<'a> {
-        GpuScene {
-            positions: &self.positions,
-            triangles: &self.triangles,
-            objects: &self.objects,
-            bounds: self.bounds,
-            cutouts: self.cutouts.as_ref().map(|[uvs, masks]| GpuCutouts { uvs, masks }),
-            geometry,
-        }
+        GpuScene { geometry, ..self.0.view() }
     }
 
     /// Bytes held on the device.
     pub fn bytes(&self) -> u64 {
-        let cutouts = self.cutouts.iter().flatten().map(wgpu::Buffer::size).sum::<u64>();
-        self.positions.size() + self.triangles.size() + cutouts
+        let cutouts = self.0.cutouts.iter().flatten().map(wgpu::Buffer::size).sum::<u64>();
+        self.0.positions.size() + self.0.triangles.size() + cutouts
     }
 }
 
