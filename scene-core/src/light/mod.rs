@@ -1,9 +1,12 @@
 //! Light kinds: what a point can see of each, and how to sample that.
 
+mod hull;
 pub mod sampling;
 
 use glam::Vec3;
 use thiserror::Error;
+
+pub use hull::LightHull;
 
 /// Why a light was refused. Field names are those of a scene file.
 #[derive(Clone, Debug, Error, PartialEq)]

@@ -208,7 +208,7 @@ fn depth_pixels<'a>(depth: &'a mut [f32], options: &DepthOptions<'_>) -> DepthPi
     DepthPixels { depth, clear: if negate { -clear } else { clear }, negate }
 }
 
-fn drawing<'a>(
+pub(super) fn drawing<'a>(
     scene: &'a Scene,
     clip_from_world: Mat4,
     options: &DepthOptions<'_>,
@@ -228,7 +228,7 @@ fn drawing<'a>(
 }
 
 /// The ranges to draw, each within one object.
-fn casters<'a>(
+pub(super) fn casters<'a>(
     scene: &'a Scene,
     options: &DepthOptions<'a>,
 ) -> impl Iterator<Item = (Range<usize>, u32)> + Clone + use<'a> {

@@ -6,6 +6,7 @@
 //! | [`render_depth_and_triangles_into`], [`render_depth_and_objects_into`] | the same, and which triangle or object is nearest |
 //! | [`render_gbuffer`] | what a camera sees of all objects |
 //! | [`count_layers`] | front and back faces over every pixel |
+//! | [`render_fragments`] | every face over every pixel, in order of depth |
 //!
 //! # How it works
 //! 1. Vertices are projected once, in f64, and snapped to 1/256 pixel (`projection`).
@@ -44,6 +45,7 @@ mod clip;
 mod cutout;
 mod depth;
 mod draw;
+mod fragments;
 mod gbuffer;
 mod layers;
 mod pixels;
@@ -57,6 +59,7 @@ pub use depth::{
     render_depth, render_depth_and_objects_into, render_depth_and_triangles_into, render_depth_into,
 };
 pub use draw::RasterScratch;
+pub use fragments::{Fragment, Fragments, render_fragments};
 pub use gbuffer::{render_gbuffer, render_gbuffer_with};
 pub use layers::{LayerCounts, count_layers};
 pub use snapped::SnappedView;

@@ -33,7 +33,7 @@ pub(super) trait Pixels: Send {
 
 /// A block that reaches over the end of the band, pixel by pixel.
 #[inline(always)]
-fn samples<S: Simd>(
+pub(super) fn samples<S: Simd>(
     pixels: &mut impl Pixels,
     index: usize,
     nearness: f32x8<S>,
