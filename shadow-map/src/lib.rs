@@ -113,6 +113,27 @@ impl ShadowMap {
         })
     }
 
+    /// Takes maps that were drawn elsewhere. Variants that draw their own while shading (`cascaded`, `multi-view`,
+    /// `alias-free`) look them up as `hard` does.
+    pub fn prepare_maps<'a>(&self, maps: LightMaps<'a>) -> (PreparedShadowMap<'a>, Report) {
+        let mut report = Report::default();
+        (PreparedShadowMap { variant: self.over(maps, &mut report) }, report)
+    }
+
+    /// The variant over one set of maps.
+    fn over<'a>(&self, maps: LightMaps<'a>, report: &mut Report) -> Box<dyn PreparedVariant + 'a> {
+        let params = &self.params;
+        match params.variant {
+            Variant::Pcf => Box::new(Pcf::new(maps, params, report)),
+            Variant::Pcss => Box::new(Pcss::new(maps, params, report)),
+            Variant::ObjectId => Box::new(ObjectId::new(maps, params, report)),
+            Variant::Moments => Box::new(Moments::new(maps, params, report)),
+            Variant::Hard | Variant::Cascaded | Variant::MultiView | Variant::AliasFree => {
+                Box::new(Hard(maps))
+            }
+        }
+    }
+
     fn prepare_with<'a>(
         &self,
         scene: &'a Scene,
@@ -122,17 +143,15 @@ impl ShadowMap {
         let (mut report, params) = (Report::default(), &self.params);
         let draw = |report: &mut Report| LightMaps::draw(scene, light, params, report, choose);
         let variant: Box<dyn PreparedVariant + 'a> = match params.variant {
-            Variant::Hard => Box::new(Hard(draw(&mut report))),
-            Variant::Pcf => Box::new(Pcf::new(draw(&mut report), params, &mut report)),
-            Variant::Pcss => Box::new(Pcss::new(draw(&mut report), params, &mut report)),
-            Variant::ObjectId => Box::new(ObjectId::new(draw(&mut report), params, &mut report)),
-            Variant::Moments => Box::new(Moments::new(draw(&mut report), params, &mut report)),
             Variant::Cascaded => match Cascaded::new(scene, light, params, &mut report) {
                 Some(cascaded) => Box::new(cascaded),
-                None => Box::new(Hard(draw(&mut report))),
+                None => self.over(draw(&mut report), &mut report),
             },
             Variant::MultiView => Box::new(MultiView::new(scene, light, params, &mut report)),
             Variant::AliasFree => Box::new(alias_free::Prepared::new(scene, light, params.skip, &mut report)),
+            Variant::Hard | Variant::Pcf | Variant::Pcss | Variant::ObjectId | Variant::Moments => {
+                self.over(draw(&mut report), &mut report)
+            }
         };
         (PreparedShadowMap { variant }, report)
     }

@@ -55,7 +55,7 @@ impl Variant {
 
     /// Whether it runs on a GPU, too.
     pub fn has_gpu_path(self) -> bool {
-        matches!(self, Self::Hard | Self::Pcf | Self::ObjectId)
+        matches!(self, Self::Hard | Self::Pcf | Self::ObjectId | Self::Pcss)
     }
 
     /// The name in settings and reports.

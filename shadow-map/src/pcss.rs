@@ -64,15 +64,21 @@ impl Blockers {
     }
 }
 
+/// Points that stand for a light, in the unit disk if it is round and in the unit square otherwise, and where in a texel
+/// each of them is looked up, from its middle.
+pub(crate) fn light_pattern(light: &Light, params: &ShadowMapParams) -> (Vec<Vec2>, Vec<Vec2>) {
+    let square = |number: u64| {
+        let key = SampleKey::new(u64::from(params.seed), number);
+        (0..params.taps).map(move |index| sobol(index, key))
+    };
+    let is_round = !matches!(light, Light::Rect { .. });
+    let points = if is_round { poisson_disk(params.taps, params.seed) } else { square(0).collect() };
+    (points, square(1).map(|point| point - 0.5).collect())
+}
+
 impl<'a> Pcss<'a> {
     pub(crate) fn new(maps: LightMaps<'a>, params: &ShadowMapParams, report: &mut Report) -> Self {
-        let square = |number: u64| {
-            let key = SampleKey::new(u64::from(params.seed), number);
-            (0..params.taps).map(move |index| sobol(index, key))
-        };
-        let is_round = !matches!(maps.light, Light::Rect { .. });
-        let points = if is_round { poisson_disk(params.taps, params.seed) } else { square(0).collect() };
-        let jitter = square(1).map(|point| point - 0.5).collect();
+        let (points, jitter) = light_pattern(&maps.light, params);
         let parallel = matches!(maps.light, Light::Directional { .. });
         Self { maps: FilterMaps::new(maps, params.skip, report), points, jitter, seed: params.seed, parallel }
     }

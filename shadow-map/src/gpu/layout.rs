@@ -2,8 +2,11 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3};
+use scene_core::Light;
 
+use super::filter_maps::LevelTable;
 use crate::light_views::{LightView, Unprojection};
+use crate::pcss::light_pattern;
 use crate::poisson_disk::poisson_disk;
 use crate::{Kernel, ShadowMapParams, Variant};
 
@@ -60,6 +63,37 @@ pub struct MapsUniform {
     pub count: u32,
     /// [`plane_tolerance`](crate::receiver_plane::plane_tolerance).
     pub tolerance: f32,
+    /// 1 where what cannot change V is left out.
+    pub skip: u32,
+    /// Numbers that a view has in the buffer of depths.
+    pub layer: u32,
+    /// Where each level starts there, as many as the largest map has and one to spare.
+    pub levels: [u32; 16],
+}
+
+impl MapsUniform {
+    /// What shaders must know of `count` maps.
+    pub fn new(count: u32, tolerance: f32, params: &ShadowMapParams, table: &LevelTable) -> Self {
+        let mut levels = [0; 16];
+        for (start, level) in levels.iter_mut().zip(&table.levels) {
+            *start = level.1;
+        }
+        Self { count, tolerance, skip: u32::from(params.skip), layer: table.layer, levels }
+    }
+}
+
+/// `Level` of `prepare_depths.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct LevelUniform {
+    /// Texels a side.
+    pub side: u32,
+    /// Texels a side of the level below.
+    pub side_below: u32,
+    /// Where it starts in a view's depths.
+    pub start: u32,
+    /// Where the level below starts.
+    pub start_below: u32,
 }
 
 /// `Filter` of `pcf.wesl`.
@@ -74,6 +108,10 @@ pub struct FilterUniform {
     pub seed: u32,
     /// 1 where a caster's object is asked and not whether it is near.
     pub by_object: u32,
+    /// Half the width of grid or disk in texels.
+    pub radius: f32,
+    /// Zero.
+    pub padding: [u32; 3],
     /// In texels: as many as the setting `taps` may have.
     pub offsets: [[f32; 2]; 1024],
 }
@@ -83,11 +121,12 @@ impl FilterUniform {
     pub fn new(params: &ShadowMapParams) -> Self {
         let mut filter = Self { seed: params.seed, ..Zeroable::zeroed() };
         filter.by_object = u32::from(params.variant == Variant::ObjectId);
+        filter.radius = params.filter as f32 * 0.5;
         match params.kernel {
             Kernel::Grid => filter.side = params.filter as i32,
             Kernel::PoissonDisk => {
                 filter.taps = params.taps.min(filter.offsets.len() as u32);
-                let radius = params.filter as f32 * 0.5;
+                let radius = filter.radius;
                 for (offset, point) in filter.offsets.iter_mut().zip(poisson_disk(filter.taps, params.seed)) {
                     *offset = (point * radius).to_array();
                 }
@@ -97,12 +136,39 @@ impl FilterUniform {
     }
 }
 
+/// `Soft` of `pcss.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct SoftUniform {
+    /// Points of the light.
+    pub taps: u32,
+    /// What a pixel's random numbers are drawn from.
+    pub seed: u32,
+    /// Zero.
+    pub padding: [u32; 2],
+    /// A point of the light, and where in a texel it is looked up: as many as the setting `taps` may have.
+    pub points: [[f32; 4]; 1024],
+}
+
+impl SoftUniform {
+    /// The points that stand for `light`.
+    pub fn new(light: &Light, params: &ShadowMapParams) -> Self {
+        let mut soft = Self { seed: params.seed, ..Zeroable::zeroed() };
+        soft.taps = params.taps.min(soft.points.len() as u32);
+        let (points, jitter) = light_pattern(light, params);
+        for ((to, point), jitter) in soft.points.iter_mut().zip(points).zip(jitter) {
+            *to = [point.x, point.y, jitter.x, jitter.y];
+        }
+        soft
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use scene_core::assert_layout;
 
     use super::*;
-    use crate::gpu::shaders::{HARD, PCF};
+    use crate::gpu::shaders::{HARD, PCF, PCSS, PREPARE_DEPTHS};
 
     #[test]
     fn layouts_are_those_of_the_shaders() {
@@ -112,7 +178,9 @@ mod tests {
             "LightView",
             [projection_from_world, origin, near, x, half_diagonal, y, z]
         );
-        assert_layout!(MapsUniform, HARD, "Maps", [count, tolerance]);
-        assert_layout!(FilterUniform, PCF, "Filter", [side, taps, seed, by_object, offsets]);
+        assert_layout!(MapsUniform, HARD, "Maps", [count, tolerance, skip, layer, levels]);
+        assert_layout!(LevelUniform, PREPARE_DEPTHS, "Level", [side, side_below, start, start_below]);
+        assert_layout!(FilterUniform, PCF, "Filter", [side, taps, seed, by_object, radius, offsets]);
+        assert_layout!(SoftUniform, PCSS, "Soft", [taps, seed, points]);
     }
 }
