@@ -26,7 +26,8 @@
 //! # Shared WGSL
 //! `shaders/*.wesl` of this crate are WESL modules: `scene_core::camera`, `light`, `sampling`, `gbuffer`, `scene`,
 //! `cutout`, `receivers`, `receiver_plane` and `full_screen` are imported by technique crates at build time (crate
-//! `gnomon-shader-build` says how and why). Bind groups have fixed places: 0 is the pass's own, 1 the scene's triangles,
+//! `gnomon-shader-build` says how and why); so are `light_views`, `depths`, `texel_plane`, `light_cone` and `pixel_hash`,
+//! what lookups in the maps of `gnomon-shadow-map` consist of: their Rust twins lie in that crate. Bind groups have fixed places: 0 is the pass's own, 1 the scene's triangles,
 //! 2 its cut-outs, 3 the receivers and the light.
 
 pub mod adapter;
