@@ -5,11 +5,12 @@ use scene_core::technique::{SettingKind, ShadowTechnique, TechniqueFactory};
 use crate::error::CliError;
 
 /// Every technique, in the order of the tables.
-pub(crate) fn all() -> [&'static dyn TechniqueFactory; 5] {
+pub(crate) fn all() -> [&'static dyn TechniqueFactory; 6] {
     [
         &gnomon_shadow_map::Factory,
         &gnomon_psm::Factory,
         &gnomon_stencil_volumes::Factory,
+        &gnomon_penumbra_wedges::Factory,
         &gnomon_pdsm::Factory,
         &gnomon_contact_hardening::Factory,
     ]

@@ -99,20 +99,22 @@ impl Bvh {
     /// A tree over what throws shadows: the triangles of objects with
     /// [`casts`](crate::geometry::ObjectFlags::casts).
     pub fn casters(scene: &Scene) -> Self {
-        Self::build(scene, true)
+        let casters = scene.objects().iter().filter(|object| object.flags.casts);
+        Self::of_triangles(scene, casters.flat_map(|object| object.triangles.clone()))
     }
 
     /// A tree over all triangles: what a camera sees.
     pub fn all(scene: &Scene) -> Self {
-        Self::build(scene, false)
+        Self::of_triangles(scene, 0..scene.triangles().len())
     }
 
-    fn build(scene: &Scene, only_casters: bool) -> Self {
-        let ids: Vec<u32> = scene
-            .objects()
-            .iter()
-            .filter(|object| object.flags.casts || !only_casters)
-            .flat_map(|object| object.triangles.clone())
+    /// A tree over these of [`Scene::triangles`], each given once.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
+    pub fn of_triangles(scene: &Scene, triangles: impl IntoIterator<Item = usize>) -> Self {
+        let ids: Vec<u32> = triangles
+            .into_iter()
             .filter(|&triangle| !exact::is_degenerate(scene.corners(triangle)))
             .map(|triangle| triangle as u32)
             .collect();

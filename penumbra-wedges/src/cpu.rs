@@ -1,0 +1,233 @@
+//! The CPU path: tiles, the wedges that each is in, and the pixels in those.
+//!
+//! The image is cut into strips of tiles of 8 × 8 pixels, a strip into runs of eight tiles. What a strip sees is in a box,
+//! and a wedge outside of that box changes none of its pixels; the others are asked again for each run, for each tile, and at
+//! last for each pixel (Szabó, 7.8: a stencil there, half-spaces here, which are stricter, since they bound the wedge on
+//! all sides). Only pixels inside of a wedge run the inner loop of [`exact`](crate::exact),
+//! [`coverage`](crate::coverage) or [`interpolated`](crate::interpolated).
+
+use fearless_simd::{Level, dispatch};
+use glam::DVec3;
+use rayon::prelude::*;
+use scene_core::bvh::Bvh;
+use scene_core::{GBuffer, Report, Scene, VisibilityImage};
+
+use crate::coverage::Coverage;
+use crate::exact::{Exact, Scratch, Work};
+use crate::interpolated::Interpolated;
+use crate::params::{Variant, WedgeParams};
+use crate::receiver::{Asked, Receiver};
+use crate::wedge::Wedge;
+use crate::wedges::Wedges;
+
+/// Pixels a side of a tile.
+pub const TILE: usize = 8;
+
+/// Tiles of a run.
+const RUN: usize = 8;
+
+/// Edges of a tile for each sample of the light above which its pixels are traced: to ask whether a receiver is in a wedge
+/// takes some 3 ns and to count an edge some 60, a ray of a packet 30.
+pub const EDGES_A_RAY: usize = 2;
+
+/// What answers for a receiver.
+#[derive(Clone, Copy, Debug)]
+pub enum Answer<'a> {
+    /// Samples.
+    Exact(Exact<'a>),
+    /// Areas.
+    Coverage(Coverage<'a>),
+    /// Planes.
+    Interpolated(Interpolated<'a>),
+}
+
+impl<'a> Answer<'a> {
+    /// By what `wedges` were prepared for.
+    pub fn new(scene: &'a Scene, tree: &'a Bvh, wedges: &'a Wedges, variant: Variant, skip: bool) -> Self {
+        match (&wedges.middle, variant) {
+            (Some(middle), Variant::Coverage) => {
+                Self::Coverage(Coverage { scene, tree, wedges, middle, skip })
+            }
+            (Some(middle), Variant::Interpolated) => {
+                Self::Interpolated(Interpolated { scene, tree, wedges, middle, skip })
+            }
+            _ => Self::Exact(Exact { scene, tree, wedges, skip }),
+        }
+    }
+
+    /// V, by those of the edges that are in question.
+    #[inline(always)]
+    pub fn visibility(&self, receiver: &Receiver, edges: &[u32], scratch: &mut Scratch) -> f32 {
+        let unclamped = match self {
+            Self::Exact(exact) => return exact.visibility(receiver, edges, scratch),
+            Self::Coverage(coverage) => coverage.unclamped(receiver, edges, &mut scratch.work),
+            Self::Interpolated(planes) => Some(planes.unclamped(receiver, edges, &mut scratch.work)),
+        };
+        match unclamped {
+            Some(v) => {
+                let by_edges = v.clamp(0.0, 1.0) as f32;
+                let (share, above) = self.as_exact().seen_of_traced(receiver, scratch);
+                (by_edges * share).min(above)
+            }
+            None => self.as_exact().traced(receiver, scratch),
+        }
+    }
+
+    /// The same wedges, to trace samples with.
+    pub fn as_exact(&self) -> Exact<'a> {
+        match *self {
+            Self::Exact(exact) => exact,
+            Self::Coverage(Coverage { scene, tree, wedges, skip, .. })
+            | Self::Interpolated(Interpolated { scene, tree, wedges, skip, .. }) => {
+                Exact { scene, tree, wedges, skip }
+            }
+        }
+    }
+}
+
+/// What a tile, a run or a strip sees.
+#[derive(Clone, Copy, Debug)]
+struct Bounds {
+    min: DVec3,
+    max: DVec3,
+}
+
+impl Bounds {
+    const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+
+    fn with(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.min.x > self.max.x
+    }
+}
+
+/// Puts into `kept` those of `edges` whose wedges touch a box.
+#[inline(always)]
+fn keep(wedges: &[Wedge], edges: impl Iterator<Item = u32>, bounds: &Bounds, kept: &mut Vec<u32>) {
+    let (center, half) = ((bounds.min + bounds.max) * 0.5, (bounds.max - bounds.min) * 0.5);
+    kept.clear();
+    if !bounds.is_empty() {
+        kept.extend(edges.filter(|&edge| wedges[edge as usize].touches(center, half)));
+    }
+}
+
+/// `shade.wedges`: V where a surface is seen, NaN elsewhere.
+pub fn shade(
+    answer: &Answer<'_>,
+    gbuffer: &GBuffer,
+    magnitude: f32,
+    params: &WedgeParams,
+    report: &mut Report,
+    visibility: &mut VisibilityImage,
+) -> Work {
+    let width = gbuffer.width as usize;
+    if width * gbuffer.height as usize == 0 {
+        return Work::default();
+    }
+    let level = Level::new();
+    report.time("shade.wedges", |_| {
+        let strips = visibility.values.par_chunks_mut(width * TILE).enumerate();
+        strips
+            .map_init(Buffers::default, |buffers, (strip, values)| {
+                let shader = Strip { answer, gbuffer, magnitude, params, first: strip * TILE * width };
+                dispatch!(level, _simd => shader.shade(values, buffers));
+                std::mem::take(&mut buffers.scratch.work)
+            })
+            .reduce(Work::default, |mut a, b| {
+                a += b;
+                a
+            })
+    })
+}
+
+/// A thread's buffers.
+#[derive(Default)]
+struct Buffers {
+    scratch: Scratch,
+    asked: Vec<Asked>,
+    bounds: Vec<Bounds>,
+    of_strip: Vec<u32>,
+    of_run: Vec<u32>,
+    of_tile: Vec<u32>,
+    all: Vec<u32>,
+}
+
+/// A row of tiles.
+struct Strip<'a> {
+    answer: &'a Answer<'a>,
+    gbuffer: &'a GBuffer,
+    magnitude: f32,
+    params: &'a WedgeParams,
+    /// The first pixel.
+    first: usize,
+}
+
+impl Strip<'_> {
+    #[inline(always)]
+    fn shade(&self, values: &mut [f32], buffers: &mut Buffers) {
+        let exact = self.answer.as_exact();
+        let wedges = &exact.wedges.wedges;
+        let width = self.gbuffer.width as usize;
+        let Buffers { scratch, asked, bounds, of_strip, of_run, of_tile, all } = buffers;
+        if !self.params.skip && all.is_empty() {
+            all.extend(0..wedges.len() as u32);
+        }
+        asked.clear();
+        bounds.clear();
+        bounds.resize(width.div_ceil(TILE), Bounds::EMPTY);
+        for pixel in 0..values.len() {
+            let known = Receiver::at(
+                exact.scene,
+                self.gbuffer,
+                &exact.wedges.light,
+                self.magnitude,
+                self.first + pixel,
+            );
+            if let Asked::Yes(receiver) = &known {
+                let tile = &mut bounds[pixel % width / TILE];
+                let place = receiver.place();
+                *tile = tile.with(Bounds { min: place, max: place });
+            }
+            asked.push(known);
+        }
+        let whole = bounds.iter().fold(Bounds::EMPTY, |sum, tile| sum.with(*tile));
+        keep(wedges, 0..wedges.len() as u32, &whole, of_strip);
+        for (run, tiles) in bounds.chunks(RUN).enumerate() {
+            let whole = tiles.iter().fold(Bounds::EMPTY, |sum, tile| sum.with(*tile));
+            keep(wedges, of_strip.iter().copied(), &whole, of_run);
+            for (tile, bounds) in tiles.iter().enumerate() {
+                keep(wedges, of_run.iter().copied(), bounds, of_tile);
+                if !bounds.is_empty() {
+                    scratch.work.tiles += 1;
+                    scratch.work.free_tiles += u64::from(of_tile.is_empty());
+                    scratch.work.wedges_left_out += (wedges.len() - of_tile.len()) as u64;
+                }
+                let samples = exact.wedges.patterns[0].count;
+                let is_dense = self.params.rays
+                    && matches!(self.answer, Answer::Exact(_))
+                    && of_tile.len() > EDGES_A_RAY * samples;
+                let edges = if self.params.skip { &*of_tile } else { &*all };
+                let first = (run * RUN + tile) * TILE;
+                for row in (0..values.len()).step_by(width) {
+                    for pixel in row + first..row + (first + TILE).min(width) {
+                        values[pixel] = match &asked[pixel] {
+                            Asked::Known(v) => *v,
+                            Asked::Dark => {
+                                scratch.work.dark += 1;
+                                0.0
+                            }
+                            Asked::Yes(receiver) if is_dense => {
+                                scratch.work.asked += 1;
+                                exact.traced(receiver, scratch)
+                            }
+                            Asked::Yes(receiver) => self.answer.visibility(receiver, edges, scratch),
+                        };
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! The trait's implementation, nothing else.
+
+use glam::Vec3;
+use scene_core::technique::{
+    Capability, Description, Params, PreparedShadow, ShadowQuery, ShadowTechnique, Support, TechniqueError,
+    TechniqueFromParams,
+};
+use scene_core::{GBuffer, Report, VisibilityImage};
+
+use crate::{Casters, PenumbraWedges, PreparedWedges, Variant, WedgeError, WedgeParams};
+
+impl ShadowTechnique for PenumbraWedges {
+    fn name(&self) -> &'static str {
+        WedgeParams::TECHNIQUE
+    }
+
+    fn describe(&self) -> Description {
+        let soft = match self.params.variant {
+            Variant::Exact => Support::Exact,
+            Variant::Coverage => {
+                Support::Approximate("overlapping shadows add up, one silhouette stands for all")
+            }
+            Variant::Interpolated => Support::Approximate("each edge is taken for a straight one of its own"),
+        };
+        let support = |capability| match capability {
+            Capability::DirectionalLight | Capability::PointLight | Capability::SpotLight => Support::Exact,
+            Capability::Sun | Capability::SphereLight | Capability::RectLight | Capability::DiskLight => soft,
+            Capability::AlphaMask if self.params.variant == Variant::Exact => Support::Exact,
+            Capability::AlphaMask => {
+                Support::Unsupported("the outline of a mask's holes has no edges: only `exact` traces them")
+            }
+            Capability::TriangleSoup | Capability::FreePoints => soft,
+            Capability::Gpu => Support::Unsupported("the CPU path is the only one so far"),
+        };
+        Description {
+            summary: SUMMARY,
+            support: Capability::ALL
+                .into_iter()
+                .map(|capability| (capability, support(capability)))
+                .collect(),
+        }
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        self.params.to_json()
+    }
+
+    fn prepare<'a>(
+        &self,
+        query: &ShadowQuery<'a>,
+    ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError> {
+        let refused = |error: WedgeError| match error {
+            WedgeError::Masked { .. } => TechniqueError::Unsupported {
+                technique: WedgeParams::TECHNIQUE,
+                input: "casters with cut-out masks".to_owned(),
+                why: error.to_string(),
+            },
+            WedgeError::Topology(_) => TechniqueError::Other(Box::new(error)),
+        };
+        let mut report = Report::default();
+        let casters = report.time("prepare.edges", |_| Casters::new(query.scene)).map_err(refused)?;
+        let (prepared, rest) =
+            PenumbraWedges::prepare(self, &casters, query.light, query.camera).map_err(refused)?;
+        report.merge(&rest);
+        Ok((Box::new(prepared), report))
+    }
+}
+
+impl PreparedShadow for PreparedWedges<'_> {
+    fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError> {
+        if visibility.values.len() != gbuffer.pixel_count() {
+            let (expected, got) = (gbuffer.pixel_count(), visibility.values.len());
+            return Err(TechniqueError::OutputSize { expected, got });
+        }
+        Ok(PreparedWedges::shade(self, gbuffer, visibility))
+    }
+
+    fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Result<Report, TechniqueError> {
+        if points.len() != visibility.len() {
+            return Err(TechniqueError::OutputSize { expected: points.len(), got: visibility.len() });
+        }
+        Ok(PreparedWedges::visibility_at(self, points, visibility))
+    }
+
+    fn survives_camera(&self) -> bool {
+        false
+    }
+}
+
+const SUMMARY: &str = "soft shadow volumes: penumbra wedges around edges, up to exact";
+
+/// Makes [`PenumbraWedges`] from settings given as text.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Factory;
+
+impl TechniqueFromParams for Factory {
+    type Params = WedgeParams;
+    const SUMMARY: &'static str = SUMMARY;
+
+    fn make(params: WedgeParams) -> Box<dyn ShadowTechnique> {
+        Box::new(PenumbraWedges::new(params))
+    }
+}
