@@ -60,7 +60,7 @@ impl<'a> Casters<'a> {
         report: &mut Report,
     ) -> Vec<Range<usize>> {
         if !skip {
-            return vec![0..self.scene.triangles().len()];
+            return std::iter::once(0..self.scene.triangles().len()).collect();
         }
         let region = CasterRegion::of(self.scene, camera, light);
         let kept = relevant_casters(self.scene, &region, &self.chunks, |_| true);

@@ -130,7 +130,8 @@ impl Coverage<'_> {
             work.rays += 1;
             return Some(if self.tree.is_occluded(origin, center) { 0.0 } else { 1.0 });
         }
-        let layers = layers_before(self.tree, &self.middle.facing, receiver, center, &mut work.rays);
+        work.rays += 1;
+        let layers = layers_before(self.scene, self.tree, &self.middle.facing, origin, center);
         Some(1.0 - (f64::from(layers) + sum))
     }
 }

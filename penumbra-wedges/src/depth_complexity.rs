@@ -4,8 +4,8 @@
 //! Call a face f *turned to the receiver* p if its corners are given so that p sees them counter-clockwise: s(f)·f with
 //! s(f) = ±1 the facing of f from p. On the plane of the light all turned faces have the same orientation: with p in the
 //! origin, n = (b − a) × (c − a) has n·(p − a) = −n·a = −det(a, b, c), so s(f) = −sign det(a, b, c). [`LightFrame::project`]
-//! is linear, and det(projected) = det(M)·det(a, b, c) is W_a W_b W_c times twice the signed area of (a, b, c) on the plane. So
-//! if det M > 0, a turned face runs clockwise there, and has its inside to the right of each of its directed edges; if
+//! is linear, and det(projected) = det(M)·det(a, b, c) is the product of the three W times twice the signed area of
+//! (a, b, c) on the plane. So if det M > 0, a turned face runs clockwise there, and has its inside to the right of each of its directed edges; if
 //! det M < 0 ([`LightFrame::turn`] = −1), to the left.
 //!
 //! The faces at an edge e add up to m(e) = Σ sign(e, f)·s(f) ([`EdgeTopology`](scene_core::geometry::EdgeTopology)). So
@@ -89,6 +89,32 @@ impl DepthComplexity {
         }
     }
 
+    /// The first sample of those with the least count, and how many these are.
+    #[inline(always)]
+    pub fn least(&self, samples: &Samples) -> (usize, usize) {
+        // What fills the last group up repeats a sample: the least stays the same.
+        let mut of_lane = [i32::MAX; LANES];
+        for counts in &self.counts {
+            for lane in 0..LANES {
+                of_lane[lane] = of_lane[lane].min(counts[lane]);
+            }
+        }
+        let least = of_lane.into_iter().fold(i32::MAX, i32::min);
+        let mut number = [0; LANES];
+        for counts in &self.counts {
+            for lane in 0..LANES {
+                number[lane] += i32::from(counts[lane] == least);
+            }
+        }
+        let mut number: i32 = number.into_iter().sum();
+        let filled = self.counts.len() * LANES - samples.count;
+        if samples.count > 0 && self.count(samples.count - 1) == least {
+            number -= filled as i32;
+        }
+        let first = (0..samples.count).find(|&sample| self.count(sample) == least).unwrap_or(0);
+        (first, number.max(0) as usize)
+    }
+
     /// The count of a sample.
     #[inline]
     pub fn count(&self, sample: usize) -> i32 {
@@ -131,6 +157,10 @@ mod tests {
                     *expected += i32::from(right(0, 1) && right(1, 2) && right(2, 0));
                 }
             }
+            let (first, number) = depth.least(&samples);
+            let least = (0..samples.count).map(|sample| depth.count(sample)).min();
+            prop_assert_eq!(Some(depth.count(first)), least);
+            prop_assert_eq!(number, (0..samples.count).filter(|&s| Some(depth.count(s)) == least).count());
             let offset = depth.count(0) - expected[0];
             for (sample, expected) in expected.iter().enumerate() {
                 prop_assert_eq!(depth.count(sample) - offset, *expected, "sample {}", samples.at(sample));

@@ -205,7 +205,7 @@ mod tests {
         let casters = Casters::new(scene).unwrap();
         let light = AreaLight::new(&Light::Sphere { center, radius: 0.5 }).unwrap();
         let sides = casters.for_faces(FaceSide::None, |t| side_of(&light, scene.corners(t)));
-        Edges::from_some_point(&casters, &sides, &[0..4])
+        Edges::from_some_point(&casters, &sides, std::slice::from_ref(&(0..4)))
     }
 
     #[test]

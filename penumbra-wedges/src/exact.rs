@@ -30,6 +30,7 @@ pub struct Exact<'a> {
 pub struct Scratch {
     placed: Samples,
     depth: DepthComplexity,
+    chords: Vec<(Chord, i32)>,
     points: Vec<LightPoint>,
     blocked: Vec<bool>,
     sample_of: Vec<u32>,
@@ -85,7 +86,16 @@ impl Exact<'_> {
         let Some(frame) = self.wedges.light.frame(receiver.place()) else {
             return self.traced(receiver, scratch);
         };
-        let Scratch { placed, depth, work, .. } = scratch;
+        self.find_chords(receiver, &frame, edges, scratch);
+        scratch.work.penumbra += u64::from(!scratch.chords.is_empty());
+        let is_simple = receiver.sees_all && self.wedges.traced.is_none();
+        if is_simple && scratch.chords.is_empty() {
+            // No face begins or ends before the light: one ray tells of all.
+            scratch.work.rays += 1;
+            let is_hidden = self.tree.is_occluded(receiver.origin, self.wedges.light.center());
+            return f32::from(u8::from(!is_hidden));
+        }
+        let Scratch { placed, depth, chords, .. } = scratch;
         let pattern = &self.wedges.patterns[receiver.pattern];
         let samples: &Samples = if matches!(frame.outline, Outline::Cap(_)) {
             pattern.placed(frame.outline, placed);
@@ -94,26 +104,24 @@ impl Exact<'_> {
             pattern
         };
         depth.clear(samples);
-        let crossed =
-            self.count(receiver, &frame, edges, work, |chord, weight| depth.add(samples, chord, weight));
-        work.penumbra += u64::from(crossed);
-        self.seen_share(receiver, &frame, crossed, scratch)
+        chords.iter().for_each(|(chord, weight)| depth.add(samples, chord, *weight));
+        if is_simple {
+            let (first, number) = depth.least(samples);
+            let point = self.wedges.light.point(&frame, receiver.place(), samples.at(first));
+            scratch.work.rays += 1;
+            let is_hidden = self.tree.is_occluded(receiver.origin, point);
+            return if is_hidden { 0.0 } else { number as f32 / samples.count as f32 };
+        }
+        self.seen_share(receiver, &frame, scratch)
     }
 
-    /// Gives `add` the chords of the edges that lie before the light, with the faces more on their right. Whether there
-    /// was one.
+    /// Puts into `scratch.chords` the edges that lie before the light, with the faces more on their right.
     #[inline(always)]
-    fn count(
-        &self,
-        receiver: &Receiver,
-        frame: &LightFrame,
-        edges: &[u32],
-        work: &mut Work,
-        mut add: impl FnMut(&Chord, i32),
-    ) -> bool {
+    fn find_chords(&self, receiver: &Receiver, frame: &LightFrame, edges: &[u32], scratch: &mut Scratch) {
         let wedges = self.wedges;
+        let Scratch { chords, work, .. } = scratch;
         let (origin, place) = (receiver.origin, receiver.place());
-        let mut crossed = false;
+        chords.clear();
         work.pairs += edges.len() as u64;
         for &index in edges {
             if self.skip && !wedges.wedges[index as usize].holds(place) {
@@ -126,55 +134,38 @@ impl Exact<'_> {
             let Some(chord) = Chord::clipped(a, b, frame.is_finite) else { continue };
             let weight = wedges.edges.multiplicity(edge, self.scene, origin) * frame.turn;
             if weight != 0 {
-                crossed = true;
-                add(&chord, weight);
+                chords.push((chord, weight));
             }
         }
-        crossed
     }
 
-    /// The share of samples that are seen, from their relative counts: the lowest count belongs to seen samples if to any,
-    /// and one ray tells.
+    /// The share of samples that are seen, from their relative counts, where some are below the surface or hidden by faces
+    /// that are traced: the lowest count of the others belongs to seen samples if to any, and one ray tells.
     #[inline(always)]
-    fn seen_share(
-        &self,
-        receiver: &Receiver,
-        frame: &LightFrame,
-        crossed: bool,
-        scratch: &mut Scratch,
-    ) -> f32 {
-        let Scratch { placed, depth, points, blocked, sample_of, work } = scratch;
+    fn seen_share(&self, receiver: &Receiver, frame: &LightFrame, scratch: &mut Scratch) -> f32 {
+        let Scratch { placed, depth, points, blocked, sample_of, work, .. } = scratch;
         let samples: &Samples = if matches!(frame.outline, Outline::Cap(_)) {
             placed
         } else {
             &self.wedges.patterns[receiver.pattern]
         };
         let point = |sample: usize| self.wedges.light.point(frame, receiver.place(), samples.at(sample));
-        if !crossed && receiver.sees_all && self.wedges.traced.is_none() {
-            work.rays += 1;
-            let sample = samples.count / 2;
-            return f32::from(u8::from(!self.tree.is_occluded(receiver.origin, point(sample))));
-        }
+        points.clear();
         sample_of.clear();
-        if receiver.sees_all && self.wedges.traced.is_none() {
-            sample_of.extend(0..samples.count as u32);
-        } else {
-            points.clear();
-            for sample in 0..samples.count {
-                let point = point(sample);
-                if receiver.is_above(point) {
-                    points.push(point);
-                    sample_of.push(sample as u32);
-                }
+        for sample in 0..samples.count {
+            let point = point(sample);
+            if receiver.is_above(point) {
+                points.push(point);
+                sample_of.push(sample as u32);
             }
-            if let Some(tree) = &self.wedges.traced {
-                work.rays += points.len() as u64;
-                blocked.clear();
-                blocked.resize(points.len(), false);
-                tree.occluded_from(receiver.origin, points, blocked);
-                let mut seen = blocked.iter();
-                sample_of.retain(|_| seen.next() == Some(&false));
-            }
+        }
+        if let Some(tree) = &self.wedges.traced {
+            work.rays += points.len() as u64;
+            blocked.clear();
+            blocked.resize(points.len(), false);
+            tree.occluded_from(receiver.origin, points, blocked);
+            let mut hidden = blocked.iter();
+            sample_of.retain(|_| hidden.next() == Some(&false));
         }
         let Some(&first) = sample_of.iter().min_by_key(|&&sample| depth.count(sample as usize)) else {
             return 0.0;

@@ -3,12 +3,12 @@
 //!
 //! Around the border of the hard shadow of the light's middle, wedges stand side by side, parted by *side planes* that
 //! neighbours share: through the vertex, the light's middle, and the mean of the neighbours' normals. A receiver belongs
-//! to the edge between whose side planes it lies. The line through it along the edge meets these planes t_l and t_r away;
-//! there the visible share of the light is S_l and S_r, and in between it is
+//! to the edge between whose side planes it lies. The line through it along the edge meets these planes tₗ and tᵣ away;
+//! there the visible share of the light is Sₗ and Sᵣ, and in between it is
 //!
-//! > s = t_r/(t_r + t_l)·S_r + t_l/(t_r + t_l)·S_l, with the weights the other way round,
+//! > s = tᵣ/(tᵣ + tₗ)·Sᵣ + tₗ/(tᵣ + tₗ)·Sₗ, with the weights the other way round,
 //!
-//! so that s is S_l where t_l is 0: as printed, each weight stands beside the wrong end.
+//! so that s is Sₗ where tₗ is 0: as printed, each weight stands beside the wrong end.
 //!
 //! On a side plane S rises linearly from the back to the front plane of the wedge, 0 to 1: with the vertex v, the light's
 //! middle O and the plane's own normal N, the ray from a point x of the plane through v passes O at the distance
@@ -86,9 +86,9 @@ impl Side {
 ///
 /// Let ê be the edge's direction, N the normal of the plane of edge and light's middle, m the unit vector in it across ê, away
 /// from the light, and h the distance of the light's middle from the edge's line. At the vertex v, w = v − O has w·m = h.
-/// Light on the side plane is between 0 and 1 for x − v = s·ŵ + τ·N_v with |τ| < R·s/|w|, R the light's reach, N_v the plane's own
-/// normal across w. Hence y = (x − v)·m ≥ s·(h − R·|N_v·m|)/|w| and |(x − v)·N| ≤ |τ|. Neither changes along ê, so that a
-/// receiver has y ≥ 0 and |z| ≤ y·R/(h − R·|N_v·m|) with the N_v of one of the ends. Where the divisor is not positive there
+/// Light on the side plane is between 0 and 1 for x − v = s·ŵ + τ·Nᵥ with |τ| < R·s/|w|, R the light's reach, Nᵥ the plane's own
+/// normal across w. Hence y = (x − v)·m ≥ s·(h − R·|Nᵥ·m|)/|w| and |(x − v)·N| ≤ |τ|. Neither changes along ê, so that a
+/// receiver has y ≥ 0 and |z| ≤ y·R/(h − R·|Nᵥ·m|) with the Nᵥ of one of the ends. Where the divisor is not positive there
 /// are side planes only.
 pub fn wedge_of(light: &AreaLight, edge: &CandidateEdge, sides: &[Side; 2]) -> Wedge {
     let (a, b) = (edge.a.as_dvec3(), edge.b.as_dvec3());
@@ -168,10 +168,10 @@ impl Interpolated<'_> {
         }
         work.penumbra += u64::from(inside);
         let center = wedges.light.center();
+        work.rays += 1;
         let layers = if inside {
-            layers_before(self.tree, &self.middle.facing, receiver, center, &mut work.rays)
+            layers_before(self.scene, self.tree, &self.middle.facing, receiver.origin, center)
         } else {
-            work.rays += 1;
             i32::from(self.tree.is_occluded(receiver.origin, center))
         };
         1.0 - f64::from(layers) + sum
