@@ -8,7 +8,7 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use gnomon_psm::views::map_views;
 use gnomon_psm::{Psm, PsmParams, Variant};
-use scene_core::{VisibilityImage, raster, scenes};
+use scene_core::{Report, VisibilityImage, raster, scenes};
 
 fn stages(c: &mut Criterion) {
     let setup = scenes::build("street", 0.0).expect("a built-in scene");
@@ -21,7 +21,17 @@ fn stages(c: &mut Criterion) {
         let params = PsmParams { variant, ..Default::default() };
         let name = variant.name();
         group.bench_function(format!("{name}/prepare.views"), |b| {
-            b.iter(|| map_views(black_box(scene), light, camera, &gbuffer, scene.bounds(), &params));
+            b.iter(|| {
+                map_views(
+                    black_box(scene),
+                    light,
+                    camera,
+                    &gbuffer,
+                    scene.bounds(),
+                    &params,
+                    &mut Report::default(),
+                )
+            });
         });
         let technique = Psm::new(params);
         group.bench_function(format!("{name}/prepare"), |b| {

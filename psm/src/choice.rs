@@ -1,7 +1,6 @@
 //! The parametrisations of a frame and which of them is taken: the variant `auto`.
 
 use glam::DVec3;
-use scene_core::relevance::Polyhedron;
 
 use crate::Variant;
 use crate::aliasing::{self, Aliasing};
@@ -45,10 +44,10 @@ pub struct Situation<'a> {
     pub frame: &'a ViewFrame,
     /// Depths of the nearest and farthest receiver.
     pub depths: [f64; 2],
-    /// Corners of a convex region that holds all receivers, each before the light and the camera.
+    /// Receivers that span the others, each before the light and the camera.
     pub receivers: Vec<DVec3>,
-    /// The casters' region H.
-    pub casters: &'a Polyhedron,
+    /// The paper's shift of the camera ([`virtual_camera::holding`]).
+    pub papers_shift: f64,
     /// Receivers that d is measured at.
     pub samples: &'a [Sample],
     /// Texels a side.
@@ -64,18 +63,17 @@ impl Situation<'_> {
             virtual_camera::least(from, self.depths[1], warp)
                 .map(|(shift, warp)| (Parametrisation::Psm { shift }, warp))
         };
-        let papers = || virtual_camera::holding(self.frame, self.depths[0], self.casters.vertices());
         let lispsm = || {
             let warp = lispsm::warp(&self.image, self.frame, self.depths, &self.receivers);
             (Parametrisation::Lispsm, warp)
         };
         let warps: Vec<_> = match variant {
             Variant::Uniform => vec![uniform()],
-            Variant::Psm => vec![psm(papers()).unwrap_or_else(uniform)],
+            Variant::Psm => vec![psm(self.papers_shift).unwrap_or_else(uniform)],
             Variant::Lispsm => vec![lispsm()],
             Variant::Auto => {
                 let mut warps = vec![uniform(), lispsm()];
-                let (least, papers) = (psm(0.0), psm(papers()));
+                let (least, papers) = (psm(0.0), psm(self.papers_shift));
                 warps.extend(least);
                 warps.extend(papers.filter(|_| papers != least));
                 warps
@@ -84,9 +82,10 @@ impl Situation<'_> {
         warps.into_iter().map(|(parametrisation, warp)| self.measured(parametrisation, warp)).collect()
     }
 
-    /// d of a warp in the window that the samples would give it.
+    /// d of a warp in the window that these receivers would give it.
     fn measured(&self, parametrisation: Parametrisation, warp: Warp) -> Candidate {
-        let window = self.samples.iter().fold(Window::EMPTY, |window, s| window.with(warp.place(s.point)));
+        let points = self.samples.iter().map(|s| s.point).chain(self.receivers.iter().copied());
+        let window = points.fold(Window::EMPTY, |window, point| window.with(warp.place(point)));
         let window = window.widened();
         let values = aliasing::of_samples(&warp, &window, self.map_size, self.frame, self.samples);
         Candidate { parametrisation, warp, aliasing: Aliasing::of(values.clone()), values }

@@ -73,10 +73,8 @@ impl Psm {
         let tolerance = plane_tolerance(scene.bounds(), light);
         let casters = relevance::told_apart(scene, light, tolerance);
         report.skip("casters", casters.backdrops.len() as u64);
-        let views = report.time("prepare.views", |_| {
-            let bounds = casters.drawn.iter().fold(Aabb::EMPTY, |sum, object| sum.union(object.bounds));
-            views::map_views(scene, light, camera, gbuffer, bounds, &params)
-        });
+        let bounds = casters.drawn.iter().fold(Aabb::EMPTY, |sum, object| sum.union(object.bounds));
+        let views = views::map_views(scene, light, camera, gbuffer, bounds, &params, &mut report);
         let maps =
             report.time("prepare.maps", |report| cpu::render_maps(scene, &casters, views, &params, report));
         report.bytes = maps.iter().map(|map| map.triangles.len() as u64 * 4).sum();

@@ -18,45 +18,55 @@
 //! inverted one. No case is told apart, so nothing jumps as a light crosses the camera's plane. The depth test is not
 //! reversed for inverted lights either, since depth does not come from this space (see [`crate::warp`]).
 
-use glam::{DVec3, DVec4};
+use glam::{DVec2, DVec3, DVec4};
 use scene_core::light::LightPoint;
 
-use crate::light_image::{MAX_TAN, middle_of};
+use crate::light_image::MAX_TAN;
 use crate::view_frame::ViewFrame;
 use crate::warp::{Warp, at};
 
-/// The virtual camera's projection to the unit cube, as forms on homogeneous world points: X, Y, Z, each times D, and
-/// D, the depth from the moved eye.
-///
-/// The cube is fitted to `receivers`: their widest tangents and their nearest and farthest depth are its sides. `None`
+/// The virtual camera's projection to the unit cube.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cube {
+    /// Forms on homogeneous world points: X, Y, Z, each times D, and D, the depth from the moved eye.
+    pub forms: [DVec4; 4],
+    /// The middle of the receivers in the cube.
+    pub middle: DVec3,
+}
+
+/// The cube that is fitted to `receivers`: their widest tangents and their nearest and farthest depth are its sides. `None`
 /// if one of them is not before the moved eye.
-pub fn cube_from_world(frame: &ViewFrame, shift: f64, receivers: &[DVec3]) -> Option<[DVec4; 4]> {
-    let (mut near, mut far, mut tan_x, mut tan_y) = (f64::INFINITY, 0f64, 0f64, 0f64);
+pub fn cube_from_world(frame: &ViewFrame, shift: f64, receivers: &[DVec3]) -> Option<Cube> {
+    let (mut near, mut far) = (f64::INFINITY, 0f64);
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    let forms = frame.forms(shift);
     for &point in receivers {
-        let p = frame.coordinates(point, shift);
+        let p = DVec3::from_array(forms.map(|form| at(form, point)));
         near = near.min(p.z);
         far = far.max(p.z);
-        tan_x = tan_x.max((p.x / p.z).abs());
-        tan_y = tan_y.max((p.y / p.z).abs());
+        let tangents = p.truncate() / p.z;
+        (low, high) = (low.min(tangents), high.max(tangents));
     }
-    if !(near > 0.0 && near <= far && far.is_finite() && tan_x.is_finite() && tan_y.is_finite()) {
+    if !(near > 0.0 && near <= far && far.is_finite() && (high - low).is_finite()) {
         return None;
     }
     // Receivers without extent still span a cube: 2⁻²⁰ is the precision of their positions.
     const LEAST: f64 = 1.0 / 1_048_576.0;
     far = far.max(near * (1.0 + LEAST));
-    let [x, y, depth] = frame.forms(shift);
+    let [x, y, depth] = forms;
     let z = (depth * (far + near) - DVec4::W * (2.0 * far * near)) / (far - near);
-    Some([x / tan_x.max(LEAST), y / tan_y.max(LEAST), z, depth])
+    let tan = low.abs().max(high.abs()).max(DVec2::splat(LEAST));
+    let middle = ((low + high) * 0.5 / tan).extend(0.0);
+    Some(Cube { forms: [x / tan.x, y / tan.y, z, depth], middle })
 }
 
 /// Where the light is in post-perspective space, homogeneous, of unit length.
-pub fn light_in_cube(cube_from_world: &[DVec4; 4], light: LightPoint) -> DVec4 {
+pub fn light_in_cube(cube: &Cube, light: LightPoint) -> DVec4 {
     let light = match light {
         LightPoint::At(place) => place.as_dvec3().extend(1.0),
         LightPoint::Towards(towards) => towards.as_dvec3().extend(0.0),
     };
-    DVec4::from_array(cube_from_world.map(|form| form.dot(light))).normalize_or_zero()
+    DVec4::from_array(cube.forms.map(|form| form.dot(light))).normalize_or_zero()
 }
 
 /// The view from the light in post-perspective space of the camera moved back by `shift`. `None` if a receiver is not
@@ -65,10 +75,10 @@ pub fn warp(frame: &ViewFrame, light: LightPoint, shift: f64, receivers: &[DVec3
     let cube = cube_from_world(frame, shift, receivers)?;
     let light = light_in_cube(&cube, light);
     let to_cube = |p: DVec3| {
-        let [x, y, z, d] = cube.map(|form| at(form, p));
+        let [x, y, z, d] = cube.forms.map(|form| at(form, p));
         DVec3::new(x, y, z) / d
     };
-    let center = middle_of(receivers.iter().map(|&p| to_cube(p)));
+    let center = cube.middle;
     let v = center * light.w - light.truncate();
     let length = v.length();
     let f = v.try_normalize()?;
@@ -88,13 +98,14 @@ pub fn warp(frame: &ViewFrame, light: LightPoint, shift: f64, receivers: &[DVec3
     if !receivers.iter().all(inside) {
         return None;
     }
-    let to_world = |form: DVec4| cube[0] * form.x + cube[1] * form.y + cube[2] * form.z + cube[3] * form.w;
+    let [cube_x, cube_y, cube_z, cube_d] = cube.forms;
+    let to_world = |form: DVec4| cube_x * form.x + cube_y * form.y + cube_z * form.z + cube_d * form.w;
     Some(Warp { x: to_world(x), y: to_world(y), w: to_world(w) })
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::{DVec2, Vec3};
+    use glam::Vec3;
     use scene_core::Camera;
 
     use super::*;

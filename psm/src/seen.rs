@@ -1,20 +1,31 @@
-//! What a frame asks of the map: from the G-buffer, the receivers that need a lookup.
-
-use std::ops::Range;
+//! What a frame asks of the map: from the G-buffer, the receivers that need a lookup, tile by tile.
+//!
+//! `prepare.receivers` looks at every pixel once and keeps, of each tile and each image of the light, the nearest, the farthest
+//! and a typical receiver: some thousand points, however large the picture. All parametrisations are made from these and
+//! measured by them. Every pixel is asked again only for the window of the one that is taken ([`Seen::fit`]), and of those only
+//! the tiles at the window's border.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use scene_core::geometry::Aabb;
+use scene_core::camera::CameraRays;
 use scene_core::light::LightPoint;
-use scene_core::{GBuffer, Light, Scene};
+use scene_core::{Camera, GBuffer, Light, Scene};
 
-/// Samples a frame, roughly: the mean of so many is known to 3 % of their spread, and they cost as much as one pixel
-/// in a hundred.
-const SAMPLES: f64 = 1024.0;
+use crate::light_image::FACES;
+use crate::warp::{Warp, Window, at};
+
+/// Tiles a row or column of the larger side of the picture: a thousand samples, whose mean is known to 3 % of their spread.
+const TILES: u32 = 32;
+
+/// A tile's sides in pixels are a multiple of this, the side of a workgroup.
+const STEP: u32 = 8;
 
 /// Below this cosine between normal and light a surface receives next to nothing; errors are not counted there
 /// ([`scene_core::reference::valid_pixels`]), nor is aliasing.
 const GRAZING_COS: f32 = 0.05;
+
+/// What depths are widened by: more than an f32 position is off (2⁻²⁴ of it).
+const SLACK: f32 = 1.0 / 262_144.0;
 
 /// A surface point that the camera sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,109 +36,260 @@ pub struct Sample {
     pub normal: DVec3,
 }
 
-/// What of the G-buffer is turned to the light, reached by it, and shows shadows.
+/// The receivers of one tile that lie in one image of the light. Pixels are [`GBuffer::NOTHING`] where there is none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tile {
+    /// The pixel of the nearest receiver; of equal ones the first.
+    pub nearest: u32,
+    /// The pixel of the farthest receiver; of equal ones the first.
+    pub farthest: u32,
+    /// The pixel of the receiver nearest to the tile's middle that light does not graze.
+    pub sample: u32,
+}
+
+impl Tile {
+    /// A tile without receivers.
+    pub const EMPTY: Self =
+        Self { nearest: GBuffer::NOTHING, farthest: GBuffer::NOTHING, sample: GBuffer::NOTHING };
+}
+
+/// How a picture is cut into tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileGrid {
+    /// Pixels a side.
+    pub side: u32,
+    /// Tiles a row.
+    pub columns: u32,
+    /// Rows of tiles.
+    pub rows: u32,
+}
+
+impl TileGrid {
+    /// For a picture of this size: at most 32 × 32 tiles.
+    pub fn new(width: u32, height: u32) -> Self {
+        let side = width.max(height).div_ceil(TILES).max(1).next_multiple_of(STEP);
+        Self { side, columns: width.div_ceil(side), rows: height.div_ceil(side) }
+    }
+
+    /// How far a pixel is from its tile's middle: the least is the tile's sample.
+    #[inline]
+    pub fn off_middle(&self, x: u32, y: u32) -> u32 {
+        let half = self.side / 2;
+        (x % self.side).abs_diff(half) + (y % self.side).abs_diff(half)
+    }
+}
+
+/// The receivers of a picture that lie in one image of the light.
 #[derive(Clone, Debug)]
-pub struct Seen {
-    /// One of each of some thousand squares of pixels that has one, in order.
-    pub samples: Vec<Sample>,
+pub struct Seen<'a> {
+    wanted: &'a Wanted<'a>,
+    grid: TileGrid,
+    tiles: Vec<Tile>,
     /// Nearest and farthest depth along the view direction, scene units.
     pub depths: [f32; 2],
-    /// Bounds of the positions.
-    pub bounds: Aabb,
+    /// Of each tile that has one, in order.
+    pub samples: Vec<Sample>,
+    /// The nearest and the farthest of each square of 2 × 2 tiles: together they span what is seen but for a tile's width.
+    pub ends: Vec<DVec3>,
 }
 
 /// Which pixels need a lookup.
-pub(crate) struct Wanted<'a> {
-    scene: &'a Scene,
+pub struct Wanted<'a> {
     gbuffer: &'a GBuffer,
+    eye: DVec3,
+    rays: CameraRays,
     center: LightPoint,
+    receives: Vec<bool>,
     /// A spot's place, unit axis and cosine, widened by 16 roundings of `Light::reaches`.
     cone: Option<(Vec3, Vec3, f32)>,
 }
 
+impl std::fmt::Debug for Wanted<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Wanted").field("center", &self.center).finish_non_exhaustive()
+    }
+}
+
 impl<'a> Wanted<'a> {
-    pub(crate) fn new(scene: &'a Scene, gbuffer: &'a GBuffer, light: &Light) -> Self {
+    /// Of what `camera` sees in `gbuffer`.
+    pub fn new(scene: &Scene, gbuffer: &'a GBuffer, camera: &Camera, light: &Light) -> Self {
         let cone = match *light {
             Light::Spot { position, direction, outer, .. } => {
                 Some((position, direction.normalize_or_zero(), outer.cos() - 1.0 / 1_048_576.0))
             }
             _ => None,
         };
-        Self { scene, gbuffer, center: light.center(), cone }
-    }
-
-    pub(crate) fn gbuffer(&self) -> &'a GBuffer {
-        self.gbuffer
-    }
-
-    /// The point that a pixel sees if it is wanted.
-    #[inline]
-    pub(crate) fn at(&self, pixel: usize) -> Option<Vec3> {
-        if !self.gbuffer.is_seen(pixel) {
-            return None;
+        let receives = scene.objects().iter().map(|object| object.flags.receives).collect();
+        Self {
+            gbuffer,
+            eye: camera.eye.as_dvec3(),
+            rays: camera.rays(),
+            center: light.center(),
+            receives,
+            cone,
         }
-        let (point, normal) = (self.gbuffer.position[pixel], self.gbuffer.normal[pixel]);
-        let (to_light, _) = self.center.ray_from(point);
-        let object = self.gbuffer.object[pixel] as usize;
-        let receives = self.scene.objects().get(object).is_some_and(|o| o.flags.receives);
-        let reached = self.cone.is_none_or(|(place, axis, cos)| {
-            let from = point - place;
-            from.dot(axis) >= cos * from.length()
-        });
-        (normal.dot(to_light) > 0.0 && receives && reached && point.is_finite()).then_some(point)
     }
 
-    fn sample(&self, pixel: usize, point: Vec3) -> Option<Sample> {
+    /// Whether the pixel sees a surface that is turned to the light, reached by it, and shows shadows; and whether light
+    /// does more than graze it.
+    #[inline]
+    fn at(&self, pixel: usize) -> Option<bool> {
+        // NaN where nothing is seen: not turned to anything.
         let normal = self.gbuffer.normal[pixel];
-        let (to_light, _) = self.center.ray_from(point);
-        let seen = normal.dot(to_light.normalize_or_zero()) > GRAZING_COS;
-        seen.then(|| Sample { point: point.as_dvec3(), normal: normal.as_dvec3() })
-    }
-}
-
-/// Pixels a side of the squares that a sample each is taken of.
-fn square(gbuffer: &GBuffer) -> usize {
-    ((gbuffer.pixel_count() as f64 / SAMPLES).sqrt() as usize).max(1)
-}
-
-/// Pixels that a thread takes at once: a row of squares.
-pub(crate) fn bands(gbuffer: &GBuffer) -> impl IndexedParallelIterator<Item = Range<usize>> + use<> {
-    let (width, height, square) = (gbuffer.width as usize, gbuffer.height as usize, square(gbuffer));
-    (0..height.div_ceil(square))
-        .into_par_iter()
-        .map(move |band| band * square * width..((band + 1) * square).min(height) * width)
-}
-
-/// Looks through the G-buffer for receivers that `keep` takes.
-pub(crate) fn seen(wanted: &Wanted<'_>, keep: impl Fn(Vec3) -> bool + Sync) -> Seen {
-    let width = wanted.gbuffer.width.max(1) as usize;
-    let square = square(wanted.gbuffer);
-    let parts: Vec<Seen> = bands(wanted.gbuffer)
-        .map(|pixels| {
-            let mut part = Seen { samples: Vec::new(), depths: [f32::INFINITY, 0.0], bounds: Aabb::EMPTY };
-            let mut of_square = vec![None; width.div_ceil(square)];
-            for pixel in pixels.clone() {
-                let Some(point) = wanted.at(pixel).filter(|&point| keep(point)) else { continue };
-                let depth = wanted.gbuffer.depth[pixel];
-                part.depths = [part.depths[0].min(depth), part.depths[1].max(depth)];
-                part.bounds = part.bounds.with_point(point);
-                // The first, and up to the middle row the last: near the middle where it is all wanted.
-                let column = pixel % width;
-                let row = (pixel - pixels.start) / width;
-                let slot = &mut of_square[column / square];
-                if slot.is_none() || row <= square / 2 && column % square <= square / 2 {
-                    *slot = wanted.sample(pixel, point).or(*slot);
-                }
+        let (turned, length_squared) = match self.center {
+            LightPoint::Towards(towards) => (normal.dot(towards), 1.0),
+            LightPoint::At(place) => {
+                let to_light = place - self.gbuffer.position[pixel];
+                (normal.dot(to_light), to_light.length_squared())
             }
-            part.samples.extend(of_square.into_iter().flatten());
-            part
-        })
-        .collect();
-    let mut all = Seen { samples: Vec::new(), depths: [f32::INFINITY, 0.0], bounds: Aabb::EMPTY };
-    for part in parts {
-        all.samples.extend(part.samples);
-        all.depths = [all.depths[0].min(part.depths[0]), all.depths[1].max(part.depths[1])];
-        all.bounds = all.bounds.union(part.bounds);
+        };
+        let receives = || self.receives.get(self.gbuffer.object[pixel] as usize).is_some_and(|r| *r);
+        let reached = || {
+            self.cone.is_none_or(|(place, axis, cos)| {
+                let from = self.gbuffer.position[pixel] - place;
+                from.dot(axis) >= cos * from.length()
+            })
+        };
+        let wanted = turned > 0.0 && self.gbuffer.depth[pixel].is_finite() && receives() && reached();
+        wanted.then(|| turned * turned > GRAZING_COS * GRAZING_COS * length_squared)
     }
-    all
+
+    /// `prepare.receivers`: the receivers of each of `images` images of the light, told apart by `image_of` a point.
+    pub fn seen(&self, images: usize, image_of: impl Fn(Vec3) -> usize + Sync) -> Vec<Seen<'_>> {
+        let grid = TileGrid::new(self.gbuffer.width, self.gbuffer.height);
+        let columns = grid.columns as usize;
+        let mut tiles = vec![Tile::EMPTY; images * columns * grid.rows as usize];
+        tiles.par_chunks_mut((images * columns).max(1)).enumerate().for_each(|(row, tiles)| {
+            for (column, tiles) in tiles.chunks_exact_mut(images).enumerate() {
+                self.look_at(grid, [column, row], tiles, &image_of);
+            }
+        });
+        let of_image = |image: usize| tiles.iter().skip(image).step_by(images).copied().collect();
+        (0..images).map(|image| Seen::new(self, grid, of_image(image))).collect()
+    }
+
+    /// Pixels of a tile, row by row.
+    fn pixels(&self, grid: TileGrid, [column, row]: [usize; 2]) -> impl Iterator<Item = (u32, u32, usize)> {
+        let (width, height, side) = (self.gbuffer.width, self.gbuffer.height, grid.side);
+        let (left, top) = (column as u32 * side, row as u32 * side);
+        (top..(top + side).min(height)).flat_map(move |y| {
+            (left..(left + side).min(width)).map(move |x| (x, y, y as usize * width as usize + x as usize))
+        })
+    }
+
+    fn look_at(
+        &self,
+        grid: TileGrid,
+        place: [usize; 2],
+        tiles: &mut [Tile],
+        image_of: &(impl Fn(Vec3) -> usize + Sync),
+    ) {
+        let depth = &self.gbuffer.depth;
+        let mut off_middle = [u32::MAX; FACES.len()];
+        for (x, y, pixel) in self.pixels(grid, place) {
+            let Some(counts) = self.at(pixel) else { continue };
+            let image = if tiles.len() == 1 { 0 } else { image_of(self.gbuffer.position[pixel]) };
+            let (tile, off_middle) = (&mut tiles[image], &mut off_middle[image]);
+            if tile.nearest == GBuffer::NOTHING || depth[pixel] < depth[tile.nearest as usize] {
+                tile.nearest = pixel as u32;
+            }
+            if tile.farthest == GBuffer::NOTHING || depth[pixel] > depth[tile.farthest as usize] {
+                tile.farthest = pixel as u32;
+            }
+            let off = grid.off_middle(x, y);
+            if counts && off < *off_middle {
+                (*off_middle, tile.sample) = (off, pixel as u32);
+            }
+        }
+    }
+}
+
+impl<'a> Seen<'a> {
+    fn new(wanted: &'a Wanted<'a>, grid: TileGrid, tiles: Vec<Tile>) -> Self {
+        let GBuffer { position, normal, depth, .. } = wanted.gbuffer;
+        let mut seen = Self {
+            wanted,
+            grid,
+            depths: [f32::INFINITY, 0.0],
+            samples: Vec::with_capacity(tiles.len()),
+            ends: Vec::with_capacity(tiles.len() / 2),
+            tiles,
+        };
+        let columns = grid.columns as usize;
+        for (top, left) in
+            (0..grid.rows as usize).step_by(2).flat_map(|top| (0..columns).step_by(2).map(move |x| (top, x)))
+        {
+            let rows = top..(top + 2).min(grid.rows as usize);
+            let square = rows.flat_map(|row| (left..(left + 2).min(columns)).map(move |x| row * columns + x));
+            let tiles = square.map(|index| seen.tiles[index]).filter(|tile| tile.nearest != GBuffer::NOTHING);
+            let ends = tiles.map(|tile| [tile.nearest, tile.farthest]).reduce(|[near, far], [n, f]| {
+                let depth = |pixel: u32| depth[pixel as usize];
+                [if depth(n) < depth(near) { n } else { near }, if depth(f) > depth(far) { f } else { far }]
+            });
+            let Some([near, far]) = ends.map(|ends| ends.map(|pixel| pixel as usize)) else { continue };
+            seen.depths = [seen.depths[0].min(depth[near]), seen.depths[1].max(depth[far])];
+            seen.ends.extend([near, far].map(|pixel| position[pixel].as_dvec3()));
+        }
+        let samples = seen.tiles.iter().filter(|tile| tile.sample != GBuffer::NOTHING);
+        seen.samples.extend(samples.map(|tile| Sample {
+            point: position[tile.sample as usize].as_dvec3(),
+            normal: normal[tile.sample as usize].as_dvec3(),
+        }));
+        seen.samples.retain(|sample| sample.point.is_finite());
+        seen.ends.retain(|point| point.is_finite());
+        seen
+    }
+
+    /// Whether there is no receiver.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// The window of `warp` around all receivers, and the range of w over them. `is_of` takes those of this image.
+    ///
+    /// The ends give most of it; a tile is asked pixel by pixel only if the part of the view that holds its receivers
+    /// reaches beyond.
+    pub fn fit(&self, warp: &Warp, is_of: impl Fn(Vec3) -> bool + Sync) -> (Window, [f64; 2]) {
+        let with = |(window, [low, high]): (Window, [f64; 2]), point: DVec3| {
+            let w = at(warp.w, point);
+            (window.with(warp.place(point)), [low.min(w), high.max(w)])
+        };
+        let nothing = (Window::EMPTY, [f64::INFINITY, f64::NEG_INFINITY]);
+        let first = self.ends.iter().copied().fold(nothing, with);
+        let position = &self.wanted.gbuffer.position;
+        let columns = self.grid.columns as usize;
+        let asked = self.tiles.par_iter().enumerate().filter_map(|(index, tile)| {
+            if tile.nearest == GBuffer::NOTHING {
+                return None;
+            }
+            let place = [index % columns, index / columns];
+            let around = self.corners(place, tile).into_iter().fold(nothing, with);
+            let is_inside = around.1[0] > 0.0
+                && first.0.union(around.0) == first.0
+                && around.1[0] >= first.1[0]
+                && around.1[1] <= first.1[1];
+            let pixels = self.wanted.pixels(self.grid, place).map(|(_, _, pixel)| pixel);
+            let points = pixels.filter(|&pixel| self.wanted.at(pixel).is_some()).map(|pixel| position[pixel]);
+            (!is_inside).then(|| points.filter(|&p| is_of(p)).map(Vec3::as_dvec3).fold(nothing, with))
+        });
+        asked.reduce(
+            || first,
+            |(a, [low, high]), (b, [lower, higher])| (a.union(b), [low.min(lower), high.max(higher)]),
+        )
+    }
+
+    /// Corners of the part of the view that holds a tile's receivers: from the pixels' outer borders, half a pixel beyond
+    /// any centre, which is more than positions are rounded by as long as the scene's place has fewer digits than they.
+    fn corners(&self, [column, row]: [usize; 2], tile: &Tile) -> [DVec3; 8] {
+        let Wanted { gbuffer, eye, rays, .. } = self.wanted;
+        let side = self.grid.side as f32;
+        let depth = |pixel: u32| gbuffer.depth[pixel as usize];
+        let depths = [depth(tile.nearest) * (1.0 - SLACK), depth(tile.farthest) * (1.0 + SLACK)];
+        let low = glam::Vec2::new(column as f32, row as f32) * side;
+        let high = (low + side).min(glam::Vec2::new(gbuffer.width as f32, gbuffer.height as f32));
+        std::array::from_fn(|i| {
+            let pixel = glam::Vec2::new([low.x, high.x][i & 1], [low.y, high.y][i >> 1 & 1]);
+            *eye + rays.direction(pixel).as_dvec3() * f64::from(depths[i >> 2])
+        })
+    }
 }

@@ -3,8 +3,6 @@
 use glam::{DVec2, DVec3, DVec4};
 use scene_core::Camera;
 
-use crate::warp::at;
-
 /// A camera's axes, world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewFrame {
@@ -56,10 +54,5 @@ impl ViewFrame {
             (axis - self.forward * (axis.dot(from_eye) / depth)) * (pixels / depth)
         };
         [gradient(self.right, self.pixels.x), gradient(-self.up, self.pixels.y)]
-    }
-
-    /// As [`forms`](Self::forms), evaluated.
-    pub(crate) fn coordinates(&self, point: DVec3, shift: f64) -> DVec3 {
-        DVec3::from_array(self.forms(shift).map(|form| at(form, point)))
     }
 }

@@ -7,53 +7,65 @@
 //! need: the variant `psm` makes it as the paper does, `auto` tries it with and without. What *is* needed is that
 //! the light sees the receivers' cube within 60°: [`least`] finds the smallest shift that makes it so.
 
-use glam::DVec3;
-
-use crate::view_frame::ViewFrame;
 use crate::warp::Warp;
 
-/// The paper's shift, in scene units: as much as takes the nearest point of `region` (the corners of H) to the distance
-/// `near`. 0 if it is there already or there is no region.
-pub fn holding(frame: &ViewFrame, near: f64, region: impl Iterator<Item = DVec3>) -> f64 {
-    let nearest = region.map(|point| frame.depth(point)).fold(f64::INFINITY, f64::min);
-    if nearest.is_finite() { (near - nearest).max(0.0) } else { 0.0 }
+/// The paper's shift, in scene units: as much as takes the nearest point of H, at the depth `nearest_caster`, to the depth
+/// `near` of the nearest receiver there could be. 0 if it is there already or there is no H.
+pub fn holding(near: f64, nearest_caster: f64) -> f64 {
+    if nearest_caster < near && (near - nearest_caster).is_finite() { near - nearest_caster } else { 0.0 }
+}
+
+/// Steps of one round of [`least`]: a GPU tries all of them at once.
+pub const STEPS: u32 = 64;
+
+/// Rounds of [`least`]: the last step is 2⁻¹⁸ of the shift, less than shows.
+pub const ROUNDS: u32 = 4;
+
+/// The shift that step `step` of the first round adds, in units of the scene's depth: from 2⁻¹⁰ to 2³⁰.
+#[inline]
+pub fn ladder(step: u32) -> f64 {
+    (f64::from(step) * (40.0 / f64::from(STEPS - 1)) - 10.0).exp2()
 }
 
 /// The smallest shift of at least `from` for which `warp` has one, and that warp. `unit` is a length of the scene's
-/// (the depth of what is seen): shifts up to 2³⁰ of it are tried, by doubling, then by halving the last step 24 times,
-/// so that the shift follows the camera without steps that show. `None` if there is none: no perspective helps.
+/// (the depth of what is seen): shifts up to 2³⁰ of it are tried on a [`ladder`] of [`STEPS`], and each further round
+/// cuts the step that was found into as many. `None` if there is none: no perspective helps.
 pub fn least(from: f64, unit: f64, warp: impl Fn(f64) -> Option<Warp>) -> Option<(f64, Warp)> {
     if let Some(found) = warp(from) {
         return Some((from, found));
     }
-    let (mut low, mut high) = (0.0, unit / 1024.0);
-    let mut found = loop {
-        if let Some(found) = warp(from + high) {
-            break found;
+    // What works once works for all larger shifts, so that the first step is found by halving.
+    let first_of = |shift: &dyn Fn(u32) -> f64| {
+        let (mut low, mut high, mut found) = (0, STEPS, None);
+        while low < high {
+            let middle = (low + high) / 2;
+            match warp(from + shift(middle)) {
+                Some(warp) => (high, found) = (middle, Some((middle, warp))),
+                None => low = middle + 1,
+            }
         }
-        (low, high) = (high, high * 2.0);
-        if unit.is_nan() || high > unit * 1_073_741_824.0 {
-            return None;
-        }
+        found
     };
-    for _ in 0..24 {
-        let middle = (low + high) * 0.5;
-        match warp(from + middle) {
-            Some(warp) => (high, found) = (middle, warp),
-            None => low = middle,
-        }
+    let (step, mut found) = first_of(&|step| unit * ladder(step))?;
+    let (mut low, mut high) = (if step == 0 { 0.0 } else { unit * ladder(step - 1) }, unit * ladder(step));
+    for _ in 1..ROUNDS {
+        let width = (high - low) / f64::from(STEPS);
+        // The last step is `high`, which works.
+        let Some((step, warp)) = first_of(&|step| low + width * f64::from(step + 1)) else { break };
+        (low, high, found) = (low + width * f64::from(step), low + width * f64::from(step + 1), warp);
     }
     Some((from + high, found))
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::{DVec2, Vec3};
+    use glam::{DVec2, DVec3, Vec3};
     use scene_core::Camera;
     use scene_core::light::LightPoint;
 
     use super::*;
     use crate::post_perspective;
+    use crate::view_frame::ViewFrame;
     use crate::warp::{Window, at};
 
     fn frame() -> ViewFrame {
@@ -75,10 +87,11 @@ mod tests {
 
     #[test]
     fn the_shift_brings_the_nearest_caster_to_the_near_distance() {
-        let region = [DVec3::new(0.0, 3.0, 5.0), DVec3::new(0.0, 0.0, -4.0)];
-        assert_eq!(holding(&frame(), 2.0, region.into_iter()), 7.0);
-        assert_eq!(holding(&frame(), 2.0, [DVec3::new(0.0, 0.0, -4.0)].into_iter()), 0.0);
-        assert_eq!(holding(&frame(), 2.0, std::iter::empty()), 0.0);
+        // Five units behind the eye; four before it; nowhere.
+        assert_eq!(holding(2.0, -5.0), 7.0);
+        assert_eq!(holding(2.0, 4.0), 0.0);
+        assert_eq!(holding(2.0, f64::INFINITY), 0.0);
+        assert_eq!(holding(f64::INFINITY, f64::INFINITY), 0.0);
     }
 
     /// Section 4.2: "if we move the camera to infinity … the resulting perspective shadow map corresponds to a standard
