@@ -3,6 +3,8 @@
 pub mod aliasing;
 pub mod choice;
 pub mod cpu;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod light_image;
 pub mod lispsm;
 mod lookup;
@@ -22,6 +24,7 @@ use gnomon_shadow_map::receiver_plane::plane_tolerance;
 use scene_core::geometry::Aabb;
 use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage, relevance};
 
+pub use choice::Parametrisation;
 pub use lookup::Occluder;
 pub use params::{PsmParams, Show, Variant};
 pub use technique::Factory;

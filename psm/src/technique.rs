@@ -3,12 +3,18 @@
 use std::sync::OnceLock;
 
 use glam::Vec3;
+#[cfg(feature = "gpu")]
+use scene_core::Camera;
+#[cfg(feature = "gpu")]
+use scene_core::gpu::{GpuGBuffer, GpuShadowQuery, GpuShadowTechnique, Recorder};
 use scene_core::technique::{
     Capability, Description, Params, PreparedShadow, ShadowQuery, ShadowTechnique, Support, TechniqueError,
     TechniqueFromParams,
 };
 use scene_core::{GBuffer, Report, VisibilityImage, raster};
 
+#[cfg(feature = "gpu")]
+use crate::gpu::PsmOnGpu;
 use crate::{PreparedPsm, Psm, PsmParams};
 
 impl ShadowTechnique for Psm {
@@ -30,7 +36,10 @@ impl ShadowTechnique for Psm {
             Capability::FreePoints => Support::Approximate(
                 "only what shadows the camera's view is in the map: elsewhere points are lit",
             ),
-            Capability::Gpu => Support::Unsupported("this technique has a CPU path only"),
+            Capability::Gpu if !cfg!(feature = "gpu") => {
+                Support::Unsupported("built without the feature 'gpu'")
+            }
+            Capability::Gpu => Support::Exact,
         };
         Description {
             summary: SUMMARY,
@@ -53,6 +62,40 @@ impl ShadowTechnique for Psm {
             Box::new(ForAnyFrame { technique: *self, query: *query, free: OnceLock::new() }),
             Report::default(),
         ))
+    }
+
+    #[cfg(feature = "gpu")]
+    fn gpu(
+        &self,
+        device: &wgpu::Device,
+        visibility: wgpu::TextureFormat,
+    ) -> Result<Box<dyn GpuShadowTechnique>, TechniqueError> {
+        Ok(Box::new(PsmOnGpu::new(device, self.params, visibility)?))
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl GpuShadowTechnique for PsmOnGpu {
+    fn prepare(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        query: &GpuShadowQuery<'_>,
+    ) -> Result<Report, TechniqueError> {
+        PsmOnGpu::prepare(self, recorder, query)
+    }
+
+    fn shade(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        camera: &Camera,
+        gbuffer: &GpuGBuffer<'_>,
+        visibility: &wgpu::TextureView,
+    ) -> Result<Report, TechniqueError> {
+        PsmOnGpu::shade(self, recorder, camera, gbuffer, visibility)
+    }
+
+    fn survives_camera(&self) -> bool {
+        false
     }
 }
 

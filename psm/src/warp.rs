@@ -136,17 +136,22 @@ pub(crate) fn clip_from_world(ndc: &Warp, light: LightPoint, w: [f64; 2], caster
         LightPoint::At(_) => DVec4::new(0.0, 0.0, 0.0, w[0] * scale * NEAR_FRACTION),
         LightPoint::Towards(towards) => {
             let towards = towards.as_dvec3();
-            let along = casters.corners().map(|corner| towards.dot(corner.as_dvec3()));
-            let (low, high) =
-                along.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &a| (l.min(a), h.max(a)));
-            // A margin of 1/64 on both sides: the far end must not be depth 0, which is "nothing".
-            let margin = ((high - low) / 64.0).max(low.abs().max(high.abs()) * MARGIN).max(1e-30);
-            let (low, range) = (low - margin, high - low + 2.0 * margin);
+            let [low, range] = along(towards, casters);
             (towards / range).extend(-low / range) * (w[0] * scale)
         }
     };
     let rows = [ndc.x * scale, ndc.y * scale, z, ndc.w * scale].map(DVec4::as_vec4);
     Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose()
+}
+
+/// Where `casters` begin along the direction `towards` parallel light, and their extent along it, with a margin of 1/64 on both
+/// sides: the far end must not be depth 0, which is "nothing".
+pub(crate) fn along(towards: DVec3, casters: Aabb) -> [f64; 2] {
+    let along = casters.corners().map(|corner| towards.dot(corner.as_dvec3()));
+    let (low, high) =
+        along.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &a| (l.min(a), h.max(a)));
+    let margin = ((high - low) / 64.0).max(low.abs().max(high.abs()) * MARGIN).max(1e-30);
+    [low - margin, high - low + 2.0 * margin]
 }
 
 /// The four sides of a map, as half-spaces: w ± x ≥ 0 and w ± y ≥ 0. A caster outside is in no texel.

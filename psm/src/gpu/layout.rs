@@ -1,0 +1,181 @@
+//! What shaders read and write, as they lay it out. A test holds every offset against the linked WGSL.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec4};
+use scene_core::light::LightPoint;
+
+use crate::light_image::LightImage;
+use crate::params::{Show, Variant};
+use crate::seen::TileGrid;
+use crate::view_frame::ViewFrame;
+use crate::views::Images;
+use crate::{Parametrisation, PsmParams, warp};
+
+/// `Frame` of `frame.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+pub struct FrameUniform {
+    /// Texels a side of each map.
+    pub map_size: u32,
+    /// 0 to 3, in the order of [`Variant::ALL`].
+    pub variant: u32,
+    /// 1 where d is written in place of V.
+    pub shows_texels: u32,
+    /// Images of the light.
+    pub images: u32,
+    /// Pixels a side of a tile.
+    pub side: u32,
+    /// Tiles a row.
+    pub columns: u32,
+    /// Rows of tiles.
+    pub rows: u32,
+    /// Bits of [`plane_tolerance`](gnomon_shadow_map::receiver_plane::plane_tolerance).
+    pub tolerance: u32,
+}
+
+impl FrameUniform {
+    /// Of these settings, for `images` images of the light.
+    pub fn new(params: &PsmParams, images: usize, grid: TileGrid, tolerance: f32) -> Self {
+        let variant = Variant::ALL.iter().position(|&variant| variant == params.variant);
+        Self {
+            map_size: params.map_size,
+            variant: variant.unwrap_or(0) as u32,
+            shows_texels: u32::from(params.show == Show::Texels),
+            images: images as u32,
+            side: grid.side,
+            columns: grid.columns,
+            rows: grid.rows,
+            tolerance: tolerance.to_bits(),
+        }
+    }
+}
+
+/// `LightImage` of `frame.wesl`: forms on positions relative to the eye.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct ImageUniform {
+    /// Places across, times w.
+    pub x: Vec4,
+    /// Places along, times w.
+    pub y: Vec4,
+    /// Distance along the axis of a light at a place; 1 else.
+    pub w: Vec4,
+    /// The light relative to the eye, 1 last; or the direction to it, 0 last.
+    pub light: Vec4,
+    /// Along parallel light, the casters' far end relative to the eye.
+    pub along_low: f32,
+    /// Their extent along it, margins included.
+    pub along_range: f32,
+    /// The paper's shift of the camera.
+    pub papers_shift: f32,
+    /// Sine of the angle between the image's axis and the view direction.
+    pub sine: f32,
+}
+
+impl ImageUniform {
+    /// Of each image.
+    pub fn all(images: &Images, frame: &ViewFrame) -> Vec<Self> {
+        let shifts = images.papers_shift.iter();
+        images
+            .images
+            .iter()
+            .zip(shifts)
+            .map(|(image, &shift)| Self::new(image, images, frame, shift))
+            .collect()
+    }
+
+    fn new(image: &LightImage, images: &Images, frame: &ViewFrame, papers_shift: f64) -> Self {
+        let form = |axis: DVec3, from: DVec3| axis.extend(axis.dot(from)).as_vec4();
+        let (axes, zero) = (image.axes, DVec3::ZERO);
+        let (from, w, light, [low, range]) = match image.light {
+            LightPoint::At(place) => {
+                // Of the eye, as seen from the light.
+                let from = frame.eye - place.as_dvec3();
+                (from, form(-axes.z_axis, from), (-from).extend(1.0), [0.0, 1.0])
+            }
+            LightPoint::Towards(towards) => {
+                let towards = towards.as_dvec3();
+                let [low, range] = warp::along(towards, images.casters);
+                (zero, Vec4::W, towards.extend(0.0), [low - towards.dot(frame.eye), range])
+            }
+        };
+        Self {
+            x: form(axes.x_axis, from),
+            y: form(axes.y_axis, from),
+            w,
+            light: light.as_vec4(),
+            along_low: low as f32,
+            along_range: range as f32,
+            papers_shift: papers_shift as f32,
+            sine: axes.z_axis.cross(frame.forward).length() as f32,
+        }
+    }
+}
+
+/// `View` of `frame.wesl`: what a map covers, found on the GPU.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct ViewOnGpu {
+    /// x, y and w of normalised device coordinates, as forms on positions relative to the eye.
+    pub ndc: [Vec4; 3],
+    /// 1 to 3, in the order of [`Variant::ALL`]; 0 for no map.
+    pub parametrisation: u32,
+    /// Of the virtual camera, for [`Parametrisation::Psm`].
+    pub shift: f32,
+    /// Mean of what the parametrisation was chosen by.
+    pub measure: f32,
+    /// Zero.
+    pub padding: u32,
+}
+
+impl ViewOnGpu {
+    /// How its texels are spread; `None` for no map.
+    pub fn parametrisation(&self) -> Option<Parametrisation> {
+        match self.parametrisation {
+            1 => Some(Parametrisation::Psm { shift: f64::from(self.shift) }),
+            2 => Some(Parametrisation::Lispsm),
+            3 => Some(Parametrisation::Uniform),
+            _ => None,
+        }
+    }
+}
+
+/// Bytes of a `Tile` of `frame.wesl`.
+pub const TILE_BYTES: u64 = 12;
+
+/// Bytes of a `Choice` of `frame.wesl`.
+pub const CHOICE_BYTES: u64 = 112;
+
+/// Bytes of a tile's fit: three vectors.
+pub const FIT_BYTES: u64 = 48;
+
+/// Bytes from one projection to the next: what every device takes for the offset of a uniform.
+pub const PROJECTION_STRIDE: u64 = 256;
+
+#[cfg(test)]
+mod tests {
+    use scene_core::assert_layout;
+    use scene_core::gpu::testing::struct_layout;
+
+    use super::*;
+    use crate::gpu::shaders::{CHOICE, LOOKUP, SEEN, VIEWS};
+
+    #[test]
+    fn layouts_are_those_of_the_shaders() {
+        assert_layout!(
+            FrameUniform,
+            LOOKUP,
+            "Frame",
+            [map_size, variant, shows_texels, images, side, columns, rows, tolerance]
+        );
+        assert_layout!(
+            ImageUniform,
+            CHOICE,
+            "LightImage",
+            [x, y, w, light, along_low, along_range, papers_shift, sine]
+        );
+        assert_layout!(ViewOnGpu, VIEWS, "View", [ndc, parametrisation, shift, measure]);
+        assert_eq!(struct_layout(SEEN, "Tile").1 as u64, TILE_BYTES);
+        assert_eq!(struct_layout(SEEN, "Choice").1 as u64, CHOICE_BYTES);
+    }
+}
