@@ -82,6 +82,7 @@ impl Psm {
             report.time("prepare.maps", |report| cpu::render_maps(scene, &casters, views, &params, report));
         report.bytes = maps.iter().map(|map| map.triangles.len() as u64 * 4).sum();
         let backdrops = casters.backdrops;
+        let tolerance = lookup::tolerance(scene.bounds(), light);
         let questions = LightMaps { scene, light: *light, maps: Vec::new(), backdrops, tolerance };
         (PreparedPsm { questions, maps, frame: ViewFrame::new(camera), params }, report)
     }

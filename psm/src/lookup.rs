@@ -5,7 +5,8 @@
 
 use glam::{DVec3, Vec3};
 use gnomon_shadow_map::light_maps::Receiver;
-use gnomon_shadow_map::receiver_plane::{is_behind, is_near, meets, rises_above};
+use gnomon_shadow_map::receiver_plane::{is_behind, is_near, meets, plane_tolerance, rises_above};
+use scene_core::geometry::Aabb;
 use scene_core::light::LightPoint;
 use scene_core::raster::DEPTH_POSITION_ERROR;
 use scene_core::{GBuffer, Light, Scene};
@@ -23,6 +24,20 @@ pub struct Occluder {
     pub texel: f32,
     /// Distance of the receiver from the ray of the texel's centre, across it; world units.
     pub aside: f32,
+}
+
+/// Distance from a plane, in scene units, below which a point counts as on it; see [`plane_tolerance`], whose bound this one is
+/// never above.
+///
+/// That one allows for a stored depth, here the stored point is computed from the triangle's corners. With u = 2⁻²⁴, m the largest
+/// absolute coordinate and e the diagonal of `bounds`: the receiver and the stored point are each rounded to f32 once,
+/// ≤ √3·u·m; their differences from the anchor and the dot product of three terms are of size e, ≤ 16·u·e. So far from the
+/// origin the sum, 2⁻²²·(m + 4e), is an eighth of the other.
+pub(crate) fn tolerance(bounds: Aabb, light: &Light) -> f32 {
+    let own = (bounds.magnitude() + 4.0 * bounds.size().length()) * (1.0 / 4_194_304.0);
+    let other = plane_tolerance(bounds, light);
+    // An empty scene has no diagonal.
+    if own < other { own } else { other }
 }
 
 impl PsmMap {

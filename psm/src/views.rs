@@ -151,7 +151,11 @@ fn map_view(
     if window.is_empty() || !(w[0] > 0.0 && w[1].is_finite()) {
         return None;
     }
-    let window = window.widened();
+    // World positions have far-out offsets where the scene lies far out, and f32 rounds the projection.
+    let offsets = window.widened().fitted(&warp);
+    let rounding =
+        [offsets.x.w, offsets.y.w, offsets.w.w].map(f64::abs).into_iter().fold(0.0, f64::max) / w[0];
+    let window = window.widened().grown(rounding * f64::from(f32::EPSILON));
     let values = aliasing::of_samples(&warp, &window, params.map_size, frame, &seen.samples);
     let clip_from_world = warp::clip_from_world(&window.fitted(&warp), image.light, w, images.casters);
     if !clip_from_world.is_finite() {

@@ -108,6 +108,15 @@ impl Window {
         Self { min: self.min - margin, max: self.max + margin }
     }
 
+    /// Grown by a share of its half extent, unless that is less than the margin it has.
+    pub(crate) fn grown(self, share: f64) -> Self {
+        if share <= MARGIN {
+            return self;
+        }
+        let margin = (self.max - self.min) * (0.5 * share);
+        Self { min: self.min - margin, max: self.max + margin }
+    }
+
     /// Places a texel of a map of `map_size` texels a side spans.
     pub fn texel(&self, map_size: u32) -> DVec2 {
         (self.max - self.min) / f64::from(map_size.max(1))

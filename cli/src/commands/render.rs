@@ -27,8 +27,12 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<(), CliError> 
         let gbuffer = render_gbuffer(&view.setup.scene, &view.setup.camera);
         let mut stand = Stand::new(&view, &gbuffer, gpu.as_ref());
         let run = stand.run(technique.as_ref(), (args.backend, side), 1, console)?;
-        let shading = Shading::new(&gbuffer, &view.setup.camera, view.light());
-        let image = picture::png(shading.picture(&run.visibility))?;
+        let shows_texels = technique.settings().get("show").is_some_and(|show| show == "texels");
+        let image = picture::png(if shows_texels {
+            picture::texels::picture(&run.visibility)
+        } else {
+            Shading::new(&gbuffer, &view.setup.camera, view.light()).picture(&run.visibility)
+        })?;
         let visibility = &run.visibility;
         out.write(|to| {
             write::bytes(&to.join("image.png"), &image)?;

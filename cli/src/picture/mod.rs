@@ -4,6 +4,7 @@ pub(crate) mod canvas;
 pub(crate) mod colour;
 pub(crate) mod error_map;
 pub(crate) mod shading;
+pub(crate) mod texels;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{DynamicImage, GrayAlphaImage, LumaA, RgbImage};

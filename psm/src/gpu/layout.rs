@@ -29,7 +29,7 @@ pub struct FrameUniform {
     pub columns: u32,
     /// Rows of tiles.
     pub rows: u32,
-    /// Bits of [`plane_tolerance`](gnomon_shadow_map::receiver_plane::plane_tolerance).
+    /// Bits of the tolerance of the comparison, an f32.
     pub tolerance: u32,
 }
 

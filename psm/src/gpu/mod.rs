@@ -27,17 +27,17 @@ use std::ops::Range;
 use gnomon_shadow_map::receiver_plane::plane_tolerance;
 use scene_core::geometry::Aabb;
 use scene_core::gpu::{
-    Bound, DepthIds, DepthLayers, DepthPass, DepthTarget, GpuCutouts, GpuError, GpuGBuffer, GpuObject,
-    GpuScene, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings, SceneGroups,
-    VisibilityPass, VisibilityPassParts, WrittenProjection, binding,
+    Bound, ComputePass, DepthIds, DepthLayers, DepthPass, DepthTarget, GpuError, GpuGBuffer, GpuShadowQuery,
+    HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings, SceneGroups, SceneHandles, VisibilityPass,
+    VisibilityPassParts, WorkBuffer, WrittenProjection, binding,
 };
 use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Report, relevance};
 
-use crate::PsmParams;
 use crate::seen::TileGrid;
 use crate::view_frame::ViewFrame;
 use crate::views::Images;
+use crate::{PsmParams, lookup};
 use layout::{CHOICE_BYTES, FIT_BYTES, FrameUniform, ImageUniform, PROJECTION_STRIDE, TILE_BYTES, ViewOnGpu};
 
 /// The technique on one device: pipelines, and the light prepared last.
@@ -56,73 +56,40 @@ pub struct PsmOnGpu {
     receivers: Receivers,
     lookup: VisibilityPass,
     prepared: Option<Prepared>,
+    views: Option<wgpu::Buffer>,
 }
 
 /// The compute pipelines, in the order in which they run.
 #[derive(Debug)]
 struct Passes {
-    see: wgpu::ComputePipeline,
-    choose: wgpu::ComputePipeline,
-    fit: wgpu::ComputePipeline,
-    write_views: wgpu::ComputePipeline,
+    see: ComputePass,
+    choose: ComputePass,
+    fit: ComputePass,
+    write_views: ComputePass,
 }
 
 impl Passes {
     fn new(device: &wgpu::Device, own: &wgpu::BindGroupLayout, receivers: &wgpu::BindGroupLayout) -> Self {
-        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("psm"),
-            bind_group_layouts: &[Some(own), None, None, Some(receivers)],
-            immediate_size: 0,
-        });
-        let pipeline = |wgsl: &str, entry| {
-            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some(entry),
-                source: wgpu::ShaderSource::Wgsl(wgsl.into()),
-            });
-            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(entry),
-                layout: Some(&layout),
-                module: &module,
-                entry_point: Some(entry),
-                compilation_options: Default::default(),
-                cache: None,
-            })
+        let pass = |label, wgsl| {
+            ComputePass::new(device, label, wgsl, label, &[Some(own), None, None, Some(receivers)])
         };
         Self {
-            see: pipeline(shaders::SEEN, "see"),
-            choose: pipeline(shaders::CHOICE, "choose"),
-            fit: pipeline(shaders::SEEN, "fit"),
-            write_views: pipeline(shaders::VIEWS, "write_views"),
+            see: pass("see", shaders::SEEN),
+            choose: pass("choose", shaders::CHOICE),
+            fit: pass("fit", shaders::SEEN),
+            write_views: pass("write_views", shaders::VIEWS),
         }
     }
 }
 
-/// Buffers that passes write for one another, made anew when they must be larger.
-#[derive(Debug, Default)]
+/// Buffers that passes write for one another.
+#[derive(Debug)]
 struct Written {
-    tiles: Option<wgpu::Buffer>,
-    choices: Option<wgpu::Buffer>,
-    fits: Option<wgpu::Buffer>,
-    views: Option<wgpu::Buffer>,
-    projections: Option<wgpu::Buffer>,
-}
-
-fn sized(
-    held: &mut Option<wgpu::Buffer>,
-    device: &wgpu::Device,
-    label: &'static str,
-    size: u64,
-    usage: wgpu::BufferUsages,
-) -> wgpu::Buffer {
-    if let Some(buffer) = held.as_ref().filter(|buffer| buffer.size() >= size) {
-        return buffer.clone();
-    }
-    let usage = usage | wgpu::BufferUsages::STORAGE;
-    let descriptor =
-        wgpu::BufferDescriptor { label: Some(label), size: size.max(256), usage, mapped_at_creation: false };
-    let buffer = device.create_buffer(&descriptor);
-    *held = Some(buffer.clone());
-    buffer
+    tiles: WorkBuffer,
+    choices: WorkBuffer,
+    fits: WorkBuffer,
+    views: WorkBuffer,
+    projections: WorkBuffer,
 }
 
 /// What `prepare` leaves to `shade`.
@@ -133,40 +100,7 @@ struct Prepared {
     /// Ranges of triangles that are drawn.
     casters: Vec<Range<u32>>,
     scene: SceneGroups,
-    drawn: Drawn,
-}
-
-/// The caller's scene: handles of its buffers.
-#[derive(Debug)]
-struct Drawn {
-    positions: wgpu::Buffer,
-    triangles: wgpu::Buffer,
-    objects: Vec<GpuObject>,
-    bounds: Aabb,
-    cutouts: Option<[wgpu::Buffer; 2]>,
-}
-
-impl Drawn {
-    fn new(scene: &GpuScene<'_>) -> Self {
-        Self {
-            positions: scene.positions.clone(),
-            triangles: scene.triangles.clone(),
-            objects: scene.objects.to_vec(),
-            bounds: scene.bounds,
-            cutouts: scene.cutouts.map(|cutouts| [cutouts.uvs.clone(), cutouts.masks.clone()]),
-        }
-    }
-
-    fn scene(&self) -> GpuScene<'_> {
-        GpuScene {
-            positions: &self.positions,
-            triangles: &self.triangles,
-            objects: &self.objects,
-            bounds: self.bounds,
-            cutouts: self.cutouts.as_ref().map(|[uvs, masks]| GpuCutouts { uvs, masks }),
-            geometry: None,
-        }
-    }
+    drawn: SceneHandles,
 }
 
 impl PsmOnGpu {
@@ -206,7 +140,13 @@ impl PsmOnGpu {
             passes: Passes::new(device, making.layout(), receivers.layout()),
             frame: HeldBuffer::uniform("frame"),
             images: HeldBuffer::storage("images of the light"),
-            written: Written::default(),
+            written: Written {
+                tiles: WorkBuffer::new("tiles"),
+                choices: WorkBuffer::new("choices"),
+                fits: WorkBuffer::new("fits"),
+                views: WorkBuffer::new("views"),
+                projections: WorkBuffer::with_usage("projections", wgpu::BufferUsages::UNIFORM),
+            },
             making,
             own,
             depth: DepthPass::new(device, DepthIds::Triangle, None),
@@ -215,6 +155,7 @@ impl PsmOnGpu {
             receivers,
             lookup,
             prepared: None,
+            views: None,
         })
     }
 
@@ -243,10 +184,10 @@ impl PsmOnGpu {
         let objects = query.scene.objects.iter().enumerate().filter(|(id, _)| is_drawn(*id));
         self.prepared = Some(Prepared {
             images,
-            tolerance,
+            tolerance: lookup::tolerance(geometry.bounds(), query.light),
             casters: objects.map(|(_, object)| object.triangles.clone()).collect(),
             scene: self.scene.groups(recorder.device, &query.scene),
-            drawn: Drawn::new(&query.scene),
+            drawn: SceneHandles::new(&query.scene),
         });
         self.receivers.prepare(recorder.device, query);
         Ok(report)
@@ -277,39 +218,26 @@ impl PsmOnGpu {
         let frame = self.frame.get(device, bytemuck::bytes_of(&frame));
         let images = ImageUniform::all(&prepared.images, &ViewFrame::new(camera));
         let images = self.images.get(device, bytemuck::cast_slice(&images));
-        let (none, read) = (wgpu::BufferUsages::empty(), wgpu::BufferUsages::COPY_SRC);
         let Written { tiles: at_tiles, choices, fits, views, projections } = &mut self.written;
-        let view_bytes = size_of::<ViewOnGpu>() as u64;
-        let views = sized(views, device, "views", count * view_bytes, read);
-        let uniform = wgpu::BufferUsages::UNIFORM;
-        let projections = sized(projections, device, "projections", count * PROJECTION_STRIDE, uniform);
+        let views = views.get(device, count * size_of::<ViewOnGpu>() as u64)?;
+        let projections = projections.get(device, count * PROJECTION_STRIDE)?;
         let bound: [Bound; 7] = [
             frame.clone().into(),
             images.into(),
-            sized(at_tiles, device, "tiles", tiles * TILE_BYTES, none).into(),
-            sized(choices, device, "choices", count * CHOICE_BYTES, none).into(),
-            sized(fits, device, "fits", tiles * FIT_BYTES, none).into(),
+            at_tiles.get(device, tiles * TILE_BYTES)?.into(),
+            choices.get(device, count * CHOICE_BYTES)?.into(),
+            fits.get(device, tiles * FIT_BYTES)?.into(),
             views.clone().into(),
             projections.clone().into(),
         ];
         let making = self.making.get(device, &bound);
+        let groups = [Some(&making), None, None, Some(&receivers)];
         let (of_tiles, of_images) = ([grid.columns, grid.rows, count as u32], [count as u32, 1, 1]);
-        for (stage, pipeline, [x, y, z]) in [
-            ("prepare.receivers", &self.passes.see, of_tiles),
-            ("prepare.views", &self.passes.choose, of_images),
-            ("prepare.views", &self.passes.fit, of_tiles),
-            ("prepare.views", &self.passes.write_views, of_images),
-        ] {
-            let span = recorder.stage(stage);
-            let mut pass = recorder.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some(stage),
-                timestamp_writes: span.compute(),
-            });
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &making, &[]);
-            pass.set_bind_group(3, &receivers, &[]);
-            pass.dispatch_workgroups(x, y, z);
-        }
+        let Passes { see, choose, fit, write_views } = &self.passes;
+        see.record(recorder, "prepare.receivers", &groups, of_tiles);
+        choose.record(recorder, "prepare.views", &groups, of_images);
+        fit.record(recorder, "prepare.views", &groups, of_tiles);
+        write_views.record(recorder, "prepare.views", &groups, of_images);
 
         let nowhere = std::iter::repeat_n(glam::Mat4::ZERO, count as usize);
         let targets = self.layers.targets(nowhere, Some(&prepared.casters));
@@ -320,13 +248,14 @@ impl PsmOnGpu {
                 ..target
             })
             .collect();
-        self.depth.record(recorder, "prepare.maps", &prepared.drawn.scene(), &targets);
+        self.depth.record(recorder, "prepare.maps", &prepared.drawn.view(), &targets);
 
         let mut report = Report { bytes: self.layers.bytes(), ..Default::default() };
         let ids = self.layers.bound_ids().ok_or_else(not_prepared)?;
-        let own = self.own.get(device, &[frame.into(), views.into(), ids]);
+        let own = self.own.get(device, &[frame.into(), views.clone().into(), ids]);
         self.lookup.record(recorder, "shade.lookup", &own, &prepared.scene, &receivers, visibility);
         report.bytes += tiles * (TILE_BYTES + FIT_BYTES);
+        self.views = Some(views);
         Ok(report)
     }
 
@@ -338,6 +267,6 @@ impl PsmOnGpu {
     /// What the maps cover: a [`ViewOnGpu`] for each image of the light, once the frame was executed. `None` before
     /// [`shade`](Self::shade).
     pub fn views(&self) -> Option<&wgpu::Buffer> {
-        self.written.views.as_ref()
+        self.views.as_ref()
     }
 }

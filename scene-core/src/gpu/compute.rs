@@ -67,16 +67,23 @@ impl ComputePass {
 #[derive(Debug)]
 pub struct WorkBuffer {
     label: &'static str,
+    usage: wgpu::BufferUsages,
     held: Option<wgpu::Buffer>,
 }
 
 impl WorkBuffer {
     /// No buffer yet; `label` is what it holds, for errors and messages of the driver.
     pub fn new(label: &'static str) -> Self {
-        Self { label, held: None }
+        Self::with_usage(label, wgpu::BufferUsages::empty())
     }
 
-    /// The buffer, with room for `bytes` (16 at least): usages `STORAGE`, `COPY_SRC` and `COPY_DST`.
+    /// As [`new`](Self::new), for what later passes read in another way: as uniforms, for one.
+    pub fn with_usage(label: &'static str, usage: wgpu::BufferUsages) -> Self {
+        let own = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        Self { label, usage: usage | own, held: None }
+    }
+
+    /// The buffer, with room for `bytes` (16 at least): usages `STORAGE`, `COPY_SRC`, `COPY_DST` and what was asked for.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`] if the device binds less in one piece.
@@ -95,7 +102,7 @@ impl WorkBuffer {
         let buffer = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(self.label),
             size: bytes,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+            usage: self.usage,
             mapped_at_creation: false,
         });
         self.held = Some(buffer.clone());
