@@ -20,9 +20,9 @@ use scene_core::{Camera, GBuffer, Light, Scene, VisibilityImage, raster, scenes}
 const MAP_SIZE: u32 = 256;
 
 /// How far apart, in texels, the two backends may put a receiver. A place is x/w; each form is four products, each rounded, of
-/// coordinates relative to the eye, at most 20 times the window's half extent here; w is at least 1/100 of its largest, and
-/// the forms themselves go through two such sums before: 3 · 8 · 2⁻²⁴ · 20 · 100 in half windows, of 128 texels each.
-const APART: f64 = 3.0 * 8.0 / 16_777_216.0 * 20.0 * 100.0 * 128.0;
+/// coordinates relative to the eye, at most 20 times the window's half extent here, and is itself the result of two such
+/// sums: 3 · 8 · 2⁻²⁴ · 20 half windows of 128 texels.
+const APART: f64 = 3.0 * 8.0 / 16_777_216.0 * 20.0 * 128.0;
 
 struct Case<'a> {
     name: &'a str,
