@@ -9,13 +9,15 @@ use scene_core::relevance::{Backdrops, CasterChunks, CasterRegion, relevant_cast
 use scene_core::{GBuffer, Report, Scene, VisibilityImage};
 
 use crate::params::Show;
+use crate::points::PointClouds;
 use crate::views::MapView;
 use crate::{PreparedPsm, PsmMap, PsmParams};
 
-/// `prepare.maps`: draws what each map can hold.
+/// `prepare.maps`: draws what each map can hold: triangles, and over them the objects that are drawn as points.
 pub fn render_maps(
     scene: &Scene,
     casters: &Backdrops<'_>,
+    clouds: &PointClouds,
     views: Vec<MapView>,
     params: &PsmParams,
     report: &mut Report,
@@ -24,15 +26,13 @@ pub fn render_maps(
     // Depth tells which triangle is nearest and is then done with.
     let mut depth = DepthMap { width: size, height: size, depth: Vec::new() };
     let mut scratch = RasterScratch::new();
-    let everything: Vec<_> = casters.drawn.iter().map(|object| object.triangles.clone()).collect();
     views
         .into_iter()
         .map(|view| {
-            let inside = params.skip.then(|| inside_map(scene, casters, &view, report));
-            let options = DepthOptions {
-                triangles: Some(inside.as_ref().unwrap_or(&everything)),
-                ..Default::default()
-            };
+            let points = clouds.chosen(scene, &view, size);
+            let drawn = drawn(casters, &points.objects(), scene);
+            let ranges = if params.skip { inside_map(scene, &drawn, &view, report) } else { drawn.ranges };
+            let options = DepthOptions { triangles: Some(&ranges), ..Default::default() };
             let mut triangles = Vec::new();
             render_depth_and_triangles_into(
                 scene,
@@ -42,23 +42,35 @@ pub fn render_maps(
                 &mut depth,
                 &mut triangles,
             );
+            points.draw(&view, size, &depth.depth, &mut triangles);
             PsmMap { view, size, triangles }
         })
         .collect()
 }
 
-/// The casters that are not wholly beside a map: the others are in no texel of it.
-fn inside_map(
-    scene: &Scene,
-    casters: &Backdrops<'_>,
-    view: &MapView,
-    report: &mut Report,
-) -> Vec<Range<usize>> {
+/// Objects that are drawn by their triangles.
+struct Drawn {
+    /// Of each object in the scene, whether it is one.
+    is_drawn: Vec<bool>,
+    ranges: Vec<Range<usize>>,
+}
+
+/// The casters that are neither backdrops nor `points`, ids of objects.
+fn drawn(casters: &Backdrops<'_>, points: &[usize], scene: &Scene) -> Drawn {
+    let mut is_drawn = vec![true; scene.objects().len()];
+    points.iter().for_each(|&id| is_drawn[id] = false);
+    for (object, is_drawn) in scene.objects().iter().zip(&mut is_drawn) {
+        *is_drawn &= object.flags.casts && !casters.backdrops.iter().any(|b| std::ptr::eq(*b, object));
+    }
+    let objects = scene.objects().iter().zip(&is_drawn).filter(|(_, is_drawn)| **is_drawn);
+    let ranges = objects.map(|(object, _)| object.triangles.clone()).collect();
+    Drawn { is_drawn, ranges }
+}
+
+/// Those of them that are not wholly beside a map: the others are in no texel of it.
+fn inside_map(scene: &Scene, drawn: &Drawn, view: &MapView, report: &mut Report) -> Vec<Range<usize>> {
     let region = CasterRegion::inside(scene, &view.sides());
-    let kept = relevant_casters(scene, &region, &CasterChunks::default(), |id| {
-        let object = &scene.objects()[id as usize];
-        !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
-    });
+    let kept = relevant_casters(scene, &region, &CasterChunks::default(), |id| drawn.is_drawn[id as usize]);
     kept.book(report);
     kept.ranges
 }

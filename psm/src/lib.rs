@@ -9,6 +9,7 @@ pub mod light_image;
 pub mod lispsm;
 mod lookup;
 mod params;
+pub mod points;
 pub mod post_perspective;
 pub mod seen;
 mod technique;
@@ -27,6 +28,7 @@ use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage, relevan
 pub use choice::Parametrisation;
 pub use lookup::Occluder;
 pub use params::{PsmParams, Show, Variant};
+use points::PointClouds;
 pub use technique::Factory;
 use view_frame::ViewFrame;
 use views::MapView;
@@ -65,8 +67,26 @@ impl Psm {
     }
 
     /// Draws the maps of `light` for what `camera` sees in `gbuffer`. They hold for this G-buffer alone.
+    ///
+    /// Clouds of a scene that marks objects to be drawn as points are made anew; see [`prepare_with`](Self::prepare_with).
     pub fn prepare<'a>(
         &self,
+        scene: &'a Scene,
+        light: &Light,
+        camera: &Camera,
+        gbuffer: &GBuffer,
+    ) -> (PreparedPsm<'a>, Report) {
+        let mut report = Report::default();
+        let clouds = report.time("prepare.points", |_| PointClouds::new(scene));
+        let (prepared, rest) = self.prepare_with(&clouds, scene, light, camera, gbuffer);
+        report.merge(&rest);
+        (prepared, report)
+    }
+
+    /// As [`prepare`](Self::prepare), with the clouds of the same scene, kept from frame to frame.
+    pub fn prepare_with<'a>(
+        &self,
+        clouds: &PointClouds,
         scene: &'a Scene,
         light: &Light,
         camera: &Camera,
@@ -78,9 +98,9 @@ impl Psm {
         report.skip("casters", casters.backdrops.len() as u64);
         let bounds = casters.drawn.iter().fold(Aabb::EMPTY, |sum, object| sum.union(object.bounds));
         let views = views::map_views(scene, light, camera, gbuffer, bounds, &params, &mut report);
-        let maps =
-            report.time("prepare.maps", |report| cpu::render_maps(scene, &casters, views, &params, report));
-        report.bytes = maps.iter().map(|map| map.triangles.len() as u64 * 4).sum();
+        let maps = report
+            .time("prepare.maps", |report| cpu::render_maps(scene, &casters, clouds, views, &params, report));
+        report.bytes = maps.iter().map(|map| map.triangles.len() as u64 * 4).sum::<u64>() + clouds.bytes();
         let backdrops = casters.backdrops;
         let tolerance = lookup::tolerance(scene.bounds(), light);
         let questions = LightMaps { scene, light: *light, maps: Vec::new(), backdrops, tolerance };

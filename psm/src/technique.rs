@@ -15,6 +15,7 @@ use scene_core::{GBuffer, Report, VisibilityImage, raster};
 
 #[cfg(feature = "gpu")]
 use crate::gpu::PsmOnGpu;
+use crate::points::PointClouds;
 use crate::{PreparedPsm, Psm, PsmParams};
 
 impl ShadowTechnique for Psm {
@@ -58,10 +59,11 @@ impl ShadowTechnique for Psm {
         &self,
         query: &ShadowQuery<'a>,
     ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError> {
-        Ok((
-            Box::new(ForAnyFrame { technique: *self, query: *query, free: OnceLock::new() }),
-            Report::default(),
-        ))
+        let mut report = Report::default();
+        let clouds = report.time("prepare.points", |_| PointClouds::new(query.scene));
+        report.bytes = clouds.bytes();
+        let frame = ForAnyFrame { technique: *self, query: *query, clouds, free: OnceLock::new() };
+        Ok((Box::new(frame), report))
     }
 
     #[cfg(feature = "gpu")]
@@ -104,6 +106,7 @@ impl GpuShadowTechnique for PsmOnGpu {
 struct ForAnyFrame<'a> {
     technique: Psm,
     query: ShadowQuery<'a>,
+    clouds: PointClouds,
     /// For free points: the maps of what the camera sees.
     free: OnceLock<PreparedPsm<'a>>,
 }
@@ -115,7 +118,7 @@ impl PreparedShadow for ForAnyFrame<'_> {
             return Err(TechniqueError::OutputSize { expected, got });
         }
         let ShadowQuery { scene, light, camera } = self.query;
-        let (prepared, mut report) = self.technique.prepare(scene, light, camera, gbuffer);
+        let (prepared, mut report) = self.technique.prepare_with(&self.clouds, scene, light, camera, gbuffer);
         report.merge(&prepared.shade(gbuffer, visibility));
         Ok(report)
     }
@@ -128,7 +131,7 @@ impl PreparedShadow for ForAnyFrame<'_> {
         let mut report = Report::default();
         let prepared = self.free.get_or_init(|| {
             let gbuffer = raster::render_gbuffer(scene, camera);
-            let (prepared, drawn) = self.technique.prepare(scene, light, camera, &gbuffer);
+            let (prepared, drawn) = self.technique.prepare_with(&self.clouds, scene, light, camera, &gbuffer);
             report = drawn;
             prepared
         });

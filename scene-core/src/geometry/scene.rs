@@ -17,11 +17,13 @@ pub struct ObjectFlags {
     pub receives: bool,
     /// May move between frames: baked data must not contain it as a caster.
     pub dynamic: bool,
+    /// May be drawn as points by techniques that can: for what is finer than they resolve, such as leaves far off.
+    pub points: bool,
 }
 
 impl Default for ObjectFlags {
     fn default() -> Self {
-        Self { casts: true, receives: true, dynamic: false }
+        Self { casts: true, receives: true, dynamic: false, points: false }
     }
 }
 

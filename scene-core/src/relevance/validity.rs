@@ -74,7 +74,9 @@ mod tests {
         let mesh = TriangleMesh::new("t", vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
         let mut scene = Scene::new();
         for (casts, receives) in [(true, true), (false, true), (true, false), (false, false)] {
-            scene.add(&mesh, Affine3A::IDENTITY, ObjectFlags { casts, receives, dynamic: true }).unwrap();
+            scene
+                .add(&mesh, Affine3A::IDENTITY, ObjectFlags { casts, receives, dynamic: true, points: false })
+                .unwrap();
         }
         scene
     }

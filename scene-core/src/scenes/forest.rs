@@ -20,6 +20,12 @@ pub(super) const SCENE: BuiltIn = BuiltIn {
             [20_000, 20_000_000],
             "triangles in all; what is left over is less than a tuft of grass",
         ),
+        Parameter::whole(
+            "points",
+            0,
+            [0, 1],
+            "1 marks the plants to be drawn as points by techniques that can",
+        ),
         Parameter::real("light", 0.27, [0.0, 5.0], "angular radius of the sun, in degrees"),
         Parameter::SEED,
     ],
@@ -56,6 +62,7 @@ fn build(values: &Values<'_>, _time: f32) -> Stage {
     let seed = values.whole("seed");
     let budget = values.whole("triangles") as usize;
     let angular_radius = values.real("light").to_radians();
+    let flags = ObjectFlags { points: values.whole("points") == 1, ..Default::default() };
     let light = Light::Directional { direction: Vec3::new(0.75, -0.62, 0.3), angular_radius };
     let mut stage =
         Stage::new(camera(Vec3::new(-3.0, 11.0, 26.0), Vec3::new(0.0, 2.6, -6.0), 46.0, 0.3), light);
@@ -73,7 +80,7 @@ fn build(values: &Values<'_>, _time: f32) -> Stage {
         let mesh = &species[site.species].variants[site.variant];
         if mesh.triangles.len() <= left {
             left -= mesh.triangles.len();
-            stage.instance(mesh, placed(&site), ObjectFlags::default());
+            stage.instance(mesh, placed(&site), flags);
         }
     }
     stage

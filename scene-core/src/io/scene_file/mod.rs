@@ -8,7 +8,7 @@
 //! | `.scale` | a factor, or three | 1 |
 //! | `.rotate` | `[x, y, z]`: degrees about the fixed x axis, then y, then z; or a quaternion `[x, y, z, w]` | none |
 //! | `.translate` | a vector; a mesh is scaled, then rotated, then translated | none |
-//! | `.casts`, `.receives`, `.dynamic` | [`ObjectFlags`] | true, true, false |
+//! | `.casts`, `.receives`, `.dynamic`, `.points` | [`ObjectFlags`] | true, true, false, false |
 //! | `camera.eye`, `.target` | points | chosen by [`framing`]; the middle of the geometry |
 //! | `camera.up` | a direction; decides which axis is up where things are chosen | +y |
 //! | `camera.fov_y_deg` | vertical field of view in degrees | 40 |
@@ -138,6 +138,7 @@ fn load_meshes(
             casts: table.casts.unwrap_or(true),
             receives: table.receives.unwrap_or(true),
             dynamic: table.dynamic.unwrap_or(false),
+            points: table.points.unwrap_or(false),
         };
         files[mesh_path].add_to(&mut scene, *world_from_mesh, flags, mesh_path, options).map_err(within)?;
     }

@@ -32,6 +32,7 @@ pub(super) struct MeshTable {
     pub(super) casts: Option<bool>,
     pub(super) receives: Option<bool>,
     pub(super) dynamic: Option<bool>,
+    pub(super) points: Option<bool>,
 }
 
 impl<'de> Deserialize<'de> for MeshEntry {
