@@ -1,5 +1,7 @@
 //! Casters drawn as points (section 5): their maps cover what their triangles cover.
 
+use std::f32::consts::{PI, TAU};
+
 use glam::{Affine3A, Vec3};
 use gnomon_psm::points::{PointClouds, SPLAT};
 use gnomon_psm::{Psm, PsmMap, PsmParams, Variant};
@@ -26,8 +28,7 @@ fn ball(at: Vec3, points: bool) -> Scene {
     const STEPS: u32 = 300;
     let position = |i: u32| {
         let (row, column) = (i / (STEPS + 1), i % (STEPS + 1));
-        let (polar, around) =
-            (row as f32 / STEPS as f32 * 3.141_592_7, column as f32 / STEPS as f32 * 6.283_185_5);
+        let (polar, around) = (row as f32 / STEPS as f32 * PI, column as f32 / STEPS as f32 * TAU);
         at + Vec3::new(polar.sin() * around.cos(), polar.cos(), polar.sin() * around.sin())
     };
     let quad = |i: u32| {
@@ -59,7 +60,7 @@ fn map(scene: &Scene, camera: &Camera, map_size: u32) -> PsmMap {
 fn points_cover_what_the_mesh_covers() {
     let at = Vec3::new(0.0, 2.0, 0.0);
     let (mesh, points) = (ball(at, false), ball(at, true));
-    for map_size in [64i64, 128, 256] {
+    for map_size in [256i64, 512, 1024] {
         let [by_mesh, by_points] = [&mesh, &points].map(|scene| map(scene, &CAMERA, map_size as u32));
         assert_eq!(by_mesh.view, by_points.view);
         let clouds = PointClouds::new(&points);
