@@ -227,7 +227,7 @@ fn radical_inverse(index: u32) -> f64 {
     f64::from(index.reverse_bits()) / 4_294_967_296.0
 }
 
-/// Two numbers in [0, 1), scattered by `index`. The mixer is that of MurmurHash3 (public domain).
+/// Two numbers in [0, 1), scattered by `index`. The mixer is that of `MurmurHash3` (public domain).
 fn square(index: u32) -> [f32; 2] {
     let mix = |mut h: u32| {
         h = (h ^ h >> 16).wrapping_mul(0x85EB_CA6B);

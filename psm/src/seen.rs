@@ -151,7 +151,7 @@ impl<'a> Wanted<'a> {
             })
         };
         let wanted = turned > 0.0 && self.gbuffer.depth[pixel].is_finite() && receives() && reached();
-        wanted.then(|| turned * turned > GRAZING_COS * GRAZING_COS * length_squared)
+        wanted.then_some(turned * turned > GRAZING_COS * GRAZING_COS * length_squared)
     }
 
     /// `prepare.receivers`: the receivers of each of `images` images of the light, told apart by `image_of` a point.

@@ -143,7 +143,8 @@ fn map_view(
     let fit = |warp: &Warp| seen.fit(warp, |point| images.image_of(point) == index);
     let (mut parametrisation, mut warp) = (chosen.parametrisation, chosen.warp);
     let (mut window, mut w) = fit(&warp);
-    if !(w[0] > 0.0) {
+    let is_before = w[0] > 0.0;
+    if !is_before {
         // A receiver on the wrong side of w: between those that span the others. The light's own image has none.
         (parametrisation, warp) = (Parametrisation::Uniform, image.warp);
         (window, w) = fit(&warp);
