@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::error::Error;
 
-use gnomon_psm::{Psm, PsmParams};
+use gnomon_psm::Psm;
 use scene_core::SceneSetup;
 use scene_core::{Report, VisibilityImage, raster, scenes};
 
@@ -50,7 +50,7 @@ fn on_gpu(setup: &SceneSetup) -> Result<Vec<Report>, Box<dyn Error>> {
 
     let gpu = Gpu::open()?;
     let mut view = gpu.view(&setup.scene, &setup.camera)?;
-    let mut technique = view.technique(&Psm::new(PsmParams::default()))?;
+    let mut technique = view.technique(&Psm::default())?;
     (0..RUNS)
         .map(|_| {
             let (gbuffer, mut report) = view.draw_gbuffer()?;
