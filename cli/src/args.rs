@@ -23,6 +23,7 @@ Examples:
   gnomon compare dragon.obj            every technique beside ground truth, in out/dragon/index.html
   gnomon render chess --technique shadow-map --out out/chess
   gnomon reference cornell --samples 1024 --out out/truth
+  gnomon bake park -o park.pdsm        soft shadows of what stands still, in a file
   gnomon bench ball quads              run time against error, in out/bench/index.html
   gnomon techniques shadow-map         its settings, their units, ranges and defaults
   gnomon scenes                        built-in scenes and their parameters
@@ -61,6 +62,8 @@ pub(crate) enum Command {
     Compare(CompareArgs),
     /// Shadows of one light by one technique
     Render(RenderArgs),
+    /// Soft shadows of what stands still, computed once, in a file for `render --baked`
+    Bake(BakeArgs),
     /// Ground truth: visibility by ray tracing, with an error estimate
     Reference(ReferenceArgs),
     /// Run time against error over every technique, variant and preset: charts, tables, HTML page
@@ -161,7 +164,8 @@ pub(crate) struct CompareArgs {
 Examples:
   gnomon render chess --technique shadow-map --out out/chess
   gnomon render dragon.obj --technique shadow-map --set map_size=4096 --out out/dragon
-  gnomon render quads:count=5 --technique shadow-map --size 640x480 --json --out out/quads
+  gnomon render quads:squares=5 --technique shadow-map --size 640x480 --json --out out/quads
+  gnomon render park --baked park.pdsm --out out/park
 
 Writes image.png (shaded), visibility.png (grey, transparent where nothing is seen), visibility.npy (float32, \
 H×W, NaN where nothing is seen) and report.json (milliseconds per stage, bytes, what was skipped).")]
@@ -169,8 +173,13 @@ pub(crate) struct RenderArgs {
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
     /// The technique; `gnomon techniques` lists them
-    #[arg(long, value_name = "NAME")]
-    pub(crate) technique: String,
+    #[arg(long, value_name = "NAME", required_unless_present = "baked")]
+    pub(crate) technique: Option<String>,
+    /// Take what `gnomon bake` wrote in place of a technique; settings are those it was baked with
+    ///
+    /// The light and all objects that are not `dynamic` must be those that it was baked for.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["technique", "preset", "set"])]
+    pub(crate) baked: Option<PathBuf>,
     /// A rung of the technique's quality ladder, to start the settings from [default: the defaults]
     #[arg(long, value_name = "NAME")]
     pub(crate) preset: Option<String>,
@@ -182,6 +191,30 @@ pub(crate) struct RenderArgs {
     pub(crate) backend: Backend,
     /// Folder to write to; files of the same names are replaced
     #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}
+
+/// `gnomon bake`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  gnomon bake park -o park.pdsm
+  gnomon bake dragon.obj --preset high --set precision=half --out dragon.pdsm
+  gnomon bake chess --set only_surfaces=true -o chess.pdsm
+
+Builds the penumbra deep shadow map of one light (`gnomon techniques pdsm` lists its settings) over all objects that are \
+not `dynamic`, and writes it with a version and a checksum. It holds for every camera.")]
+pub(crate) struct BakeArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    /// A rung of pdsm's quality ladder, to start the settings from [default: the defaults]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) preset: Option<String>,
+    /// A setting of pdsm, on top of the preset; may be repeated
+    #[arg(long, value_name = "KEY=VALUE", value_parser = parse_setting)]
+    pub(crate) set: Vec<(String, String)>,
+    /// File to write to; one that is there is replaced when the new one is whole
+    #[arg(short, long, value_name = "FILE")]
     pub(crate) out: PathBuf,
 }
 

@@ -62,6 +62,12 @@ pub(crate) enum CliError {
         "--backend gpu: this build leaves GPUs out; take --backend cpu or auto, or build with the feature 'gpu'"
     )]
     NoGpuInBuild,
+    #[error("{}", path.display())]
+    Baked {
+        path: PathBuf,
+        #[source]
+        source: gnomon_pdsm::baked::BakedError,
+    },
     #[error("the technique's image cannot be compared with ground truth")]
     Metrics(#[from] MetricsError),
     #[error(transparent)]

@@ -54,6 +54,7 @@ fn run(arguments: &Arguments) -> Result<(), CliError> {
     match &arguments.command {
         Command::Compare(arguments) => commands::compare::run(arguments, &console),
         Command::Render(arguments) => commands::render::run(arguments, &console),
+        Command::Bake(arguments) => commands::bake::run(arguments, &console),
         Command::Reference(arguments) => commands::reference::run(arguments, &console),
         Command::Bench(arguments) => commands::bench::run(arguments, &console),
         Command::Stress(arguments) => commands::stress::run(arguments, &console),

@@ -71,16 +71,15 @@ fn construction(criterion: &mut Criterion) {
     let layout = layout(&setup, 512, 64);
     let grid = PixelGrid { size: 512, ratio: 1 };
     let casters = relevance::told_apart(scene, light, 1e-4).drawn;
-    let ranges: Vec<_> = casters.iter().map(|object| object.triangles.clone()).collect();
     println!("{} triangles, 64 maps of 512²", scene.triangles().len());
     let mut group = criterion.benchmark_group("construction");
     group.sample_size(10);
     group.bench_function("maps and events", |b| {
-        b.iter(|| black_box(cpu::collect_events(scene, &ranges, &layout, grid, true)));
+        b.iter(|| black_box(cpu::collect_events(scene, &casters, &layout, grid, true)));
     });
-    let (events, _) = cpu::collect_events(scene, &ranges, &layout, grid, true);
+    let (events, _) = cpu::collect_events(scene, &casters, &layout, grid, true);
     group.bench_function("sort and compress", |b| {
-        b.iter(|| black_box(Functions::new(512, &events, 64, 0.02)));
+        b.iter(|| black_box(Functions::new(512, &events, 64, 0.02.into(), None)));
     });
     let technique = Pdsm::new(PdsmParams { max_error: 0.02, ..Default::default() });
     group.bench_function("all", |b| b.iter(|| black_box(technique.prepare(scene, light).1)));

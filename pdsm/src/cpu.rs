@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-use glam::Vec3;
+use fearless_simd::{Level, Simd, dispatch};
+use glam::{Vec2, Vec3};
 use gnomon_shadow_map::receiver_plane::view_tolerance;
 use rayon::prelude::*;
-use scene_core::raster::{
-    DEPTH_POSITION_ERROR, DepthMap, DepthOptions, DepthRange, RasterScratch, render_depth_into,
-};
+use scene_core::geometry::Object;
+use scene_core::raster::{DepthMap, DepthOptions, DepthRange, RasterScratch, render_depth_into};
 use scene_core::{GBuffer, Light, Scene, VisibilityImage};
 
 use crate::crossings::Crossings;
@@ -15,7 +15,8 @@ use crate::emission::{EmissionScratch, emit_events};
 use crate::events::EventStrips;
 use crate::functions::Functions;
 use crate::grid::{DepthGrid, PixelGrid};
-use crate::layout::Layout;
+use crate::layout::{Layout, WindowPoint};
+use crate::maps::{LANES, MapCasters, POSITION_ERROR, Target};
 
 /// One window with its functions.
 #[derive(Clone, Debug)]
@@ -28,50 +29,85 @@ pub struct Window {
     pub functions: Functions,
 }
 
+/// Bytes of maps that a thread holds at most: views that are drawn at once grow fewer as maps grow larger.
+const MOST_MAP_BYTES: usize = 1 << 26;
+
 /// A thread's buffers while events are collected.
 struct Collector {
     raster: RasterScratch,
     map: DepthMap,
-    grid: DepthGrid,
+    grids: Vec<DepthGrid>,
     emission: EmissionScratch,
     events: EventStrips,
+    skipped: u64,
 }
 
-/// `prepare.events`: draws the map of every sample of the light and keeps its events; the map is forgotten at once, so
-/// that memory grows with the events alone. The parts are in no order. Also how many rows of maps were skipped, if `skip`
-/// says so.
+/// `prepare.events`: draws the maps of the light's samples, some at once, and keeps their events; maps are forgotten at
+/// once, so that memory grows with the events alone. The parts are in no order. Also how many rows of maps were skipped,
+/// if `skip` says so.
 pub fn collect_events(
     scene: &Scene,
-    casters: &[Range<usize>],
+    casters: &[&Object],
     layout: &Layout,
     grid: PixelGrid,
     skip: bool,
 ) -> (Vec<EventStrips>, u64) {
     let size = layout.map_size();
-    let options = DepthOptions { range: DepthRange::Clamp, triangles: Some(casters), ..Default::default() };
     let steps: Vec<_> = layout.steps().collect();
+    let at_once = MapCasters::new(scene, casters, layout);
+    let ranges: Vec<_> = casters.iter().map(|object| object.triangles.clone()).collect();
     let collector = || Collector {
         raster: RasterScratch::new(),
         map: DepthMap { width: size, height: size, depth: Vec::new() },
-        grid: DepthGrid::default(),
+        grids: Vec::new(),
         emission: EmissionScratch::default(),
         events: EventStrips::new(grid.size),
+        skipped: 0,
     };
+    let side = size as usize + 2;
     let threads = rayon::current_num_threads().max(1);
-    let parts = steps.par_chunks(steps.len().div_ceil(threads).max(1)).map(|steps| {
-        let (mut own, mut skipped) = (collector(), 0);
-        for &step in steps {
-            let projection = layout.map_projection(step);
-            render_depth_into(scene, projection, &options, &mut own.raster, &mut own.map);
-            own.grid.fill(size, &own.map.depth, layout.t_of_depth());
+    let fitting = (MOST_MAP_BYTES / (side * side * size_of::<f32>())).clamp(1, LANES);
+    let views = steps.len().div_ceil(threads).clamp(1, fitting);
+    let parts = steps.par_chunks(views).fold(collector, |mut own, steps| {
+        own.grids.resize_with(own.grids.len().max(steps.len()), DepthGrid::default);
+        draw_maps(scene, &ranges, at_once.as_ref(), layout, steps, &mut own);
+        let Collector { grids, emission, events, skipped, .. } = &mut own;
+        for (&step, map) in steps.iter().zip(grids) {
             let crossings = Crossings::new(step, layout.t_range());
-            let Collector { grid: map, emission, events, .. } = &mut own;
-            skipped += emit_events(map, grid, &crossings, skip, emission, events);
+            *skipped += emit_events(map, grid, &crossings, skip, emission, events);
         }
-        (own.events, skipped)
+        own
     });
-    let (events, skipped): (Vec<_>, Vec<u64>) = parts.unzip();
+    let (events, skipped): (Vec<_>, Vec<u64>) = parts.map(|part| (part.events, part.skipped)).unzip();
     (events, skipped.iter().sum())
+}
+
+/// Draws the maps of `steps` into the first of the grids.
+fn draw_maps(
+    scene: &Scene,
+    ranges: &[Range<usize>],
+    at_once: Option<&MapCasters>,
+    layout: &Layout,
+    steps: &[Vec2],
+    own: &mut Collector,
+) {
+    let size = layout.map_size();
+    let grids = &mut own.grids[..steps.len()];
+    let Some(casters) = at_once else {
+        let options =
+            DepthOptions { range: DepthRange::Clamp, triangles: Some(ranges), ..Default::default() };
+        for (&step, grid) in steps.iter().zip(grids) {
+            render_depth_into(scene, layout.map_projection(step), &options, &mut own.raster, &mut own.map);
+            grid.fill(size, &own.map.depth, layout.t_of_depth());
+        }
+        return;
+    };
+    grids.iter_mut().for_each(|grid| grid.clear(size));
+    let stride = size as i32 + 2;
+    let target = Target { size: size as i32, start: stride + 1, stride };
+    let mut maps: Vec<_> = grids.iter_mut().map(DepthGrid::bordered_mut).collect();
+    casters.draw(steps, target, &mut maps);
+    grids.iter_mut().for_each(DepthGrid::drawn);
 }
 
 /// What the lookups read.
@@ -83,20 +119,29 @@ pub struct Lookup<'a> {
     pub light: &'a Light,
     /// Its windows.
     pub windows: &'a [Window],
+    /// Those of casters that have a PDSM of their own.
+    pub moving: &'a [Window],
     /// [`gnomon_shadow_map::receiver_plane::plane_tolerance`].
     pub tolerance: f32,
     /// Whether four pixels are read.
     pub bilinear: bool,
 }
 
-/// Half the diagonal way from a texel's middle to its corner, in texels along each axis, and what the rasteriser's
-/// snapping adds: how far the place whose depth a texel holds may be from the ray that reads it.
-const READ_DISTANCE: f32 = 0.5 + DEPTH_POSITION_ERROR;
+/// Half the diagonal way from a texel's middle to its corner, in texels along each axis, and what the drawing of maps
+/// adds (the rasteriser of scene-core half as much): how far the place whose depth a texel holds may be from the ray that
+/// reads it.
+const READ_DISTANCE: f32 = 0.5 + POSITION_ERROR;
 
 /// What t may be off, relative to |t| + |1 − t|, between a receiver and the map's point of the same place: with u = 2⁻²⁴
 /// the receiver's t is off by 3 u of F/z = 1 − t and u of t, the map's depth by 10 u of its own largest
 /// ([`scene_core::raster::depth_error`]), which is as much of 1 − t, and the event by 4 u of t. Together below 24 u.
-const T_ERROR: f32 = 24.0 / 16_777_216.0;
+pub(crate) const T_ERROR: f32 = 24.0 / 16_777_216.0;
+
+/// How much before a surface with this slope, in t a texel, it is read: see [`Lookup`].
+#[inline]
+pub(crate) fn read_before(slope: Vec2) -> f32 {
+    READ_DISTANCE * slope.abs().element_sum()
+}
 
 impl Lookup<'_> {
     /// `shade.lookup` of one receiver with the unit normal on its lit side.
@@ -108,14 +153,15 @@ impl Lookup<'_> {
     /// 1 − g'·D = 1/(1 + g·D) that is b ≥ r·|g|₁, the same for every map.
     ///
     /// Four pixels are read each where its own ray meets the receiver's plane.
-    #[inline]
-    fn surface(&self, receiver: Vec3, normal: Vec3, depth: f32) -> f32 {
-        let Some((window, at)) = self.locate(receiver) else { return 1.0 };
+    #[inline(always)]
+    fn surface(&self, windows: &[Window], receiver: Vec3, normal: Vec3, depth: f32) -> f32 {
+        let Some((window, at)) = locate(windows, receiver) else { return 1.0 };
         let layout = &window.layout;
         let (slope, lift) = layout.plane_slope(receiver, normal, at.t);
-        let rounding =
-            (self.tolerance + view_tolerance(depth)) * lift + T_ERROR * (at.t.abs() + (1.0 - at.t).abs());
-        let before = at.t - READ_DISTANCE * slope.abs().element_sum() - rounding;
+        let rounding = (self.tolerance + view_tolerance(depth)) * lift
+            + T_ERROR * (at.t.abs() + (1.0 - at.t).abs())
+            + window.functions.nodes().depth_error();
+        let before = at.t - read_before(slope) - rounding;
         if !before.is_finite() {
             // The plane holds the light's middle: half of the light is below it at best.
             return layout.share_above(receiver, normal);
@@ -125,6 +171,7 @@ impl Lookup<'_> {
     }
 
     /// V at a free point, which has no surface of its own.
+    #[inline(always)]
     pub fn free(&self, point: Vec3) -> f32 {
         if !point.is_finite() {
             return f32::NAN;
@@ -132,20 +179,23 @@ impl Lookup<'_> {
         if !self.light.reaches(point) {
             return 0.0;
         }
-        self.locate(point)
-            .map_or(1.0, |(window, at)| window.look_up(at.texel, at.t, glam::Vec2::ZERO, self.bilinear))
+        let of = |windows| {
+            locate(windows, point)
+                .map_or(1.0, |(window, at)| window.look_up(at.texel, at.t, Vec2::ZERO, self.bilinear))
+        };
+        of(self.windows) * of(self.moving)
     }
+}
 
-    #[inline]
-    fn locate(&self, point: Vec3) -> Option<(&Window, crate::layout::WindowPoint)> {
-        self.windows.iter().find_map(|window| window.layout.locate(point).map(|at| (window, at)))
-    }
+#[inline(always)]
+fn locate(windows: &[Window], point: Vec3) -> Option<(&Window, WindowPoint)> {
+    windows.iter().find_map(|window| window.layout.locate(point).map(|at| (window, at)))
 }
 
 impl Window {
     /// V at a position on the window, at depth `t` there and `slope` more for every texel to the side.
-    #[inline]
-    fn look_up(&self, texel: glam::Vec2, t: f32, slope: glam::Vec2, bilinear: bool) -> f32 {
+    #[inline(always)]
+    fn look_up(&self, texel: Vec2, t: f32, slope: Vec2, bilinear: bool) -> f32 {
         let pixel = self.grid.from_texels(texel);
         // Far outside of the window, and for what is no number, there is nothing; the limit keeps the conversion below
         // from saturating.
@@ -154,19 +204,17 @@ impl Window {
             return 1.0;
         }
         let slope = slope * self.grid.ratio as f32;
-        let at = |column: f32, row: f32| {
-            let t = t + slope.dot(glam::Vec2::new(column, row) - pixel);
-            self.functions.visibility(column as i32, row as i32, t)
-        };
         if !bilinear {
-            return at(pixel.x.round(), pixel.y.round());
+            let nearest = pixel.round();
+            let t = t + slope.dot(nearest - pixel);
+            return self.functions.visibility(nearest.x as i32, nearest.y as i32, t);
         }
-        let (low, weight) = (pixel.floor(), pixel - pixel.floor());
-        let row = |row: f32| {
-            let (left, right) = (at(low.x, row), at(low.x + 1.0, row));
-            left + (right - left) * weight.x
-        };
-        let (top, bottom) = (row(low.y), row(low.y + 1.0));
+        let low = pixel.floor();
+        let weight = pixel - low;
+        let first = t - slope.dot(weight);
+        let depths = [first, first + slope.x, first + slope.y, first + slope.x + slope.y];
+        let [a, b, c, d] = self.functions.four(low.x as i32, low.y as i32, depths);
+        let (top, bottom) = (a + (b - a) * weight.x, c + (d - c) * weight.x);
         top + (bottom - top) * weight.y
     }
 }
@@ -174,14 +222,39 @@ impl Window {
 /// `shade.lookup`: V of every pixel that sees a surface, NaN elsewhere.
 pub fn shade(lookup: &Lookup<'_>, gbuffer: &GBuffer, visibility: &mut VisibilityImage) {
     let width = gbuffer.width.max(1) as usize;
+    let level = Level::new();
     visibility.values.par_chunks_mut(width).enumerate().for_each(|(row, values)| {
-        for (column, value) in values.iter_mut().enumerate() {
-            *value = shade_pixel(lookup, gbuffer, row * width + column);
-        }
+        // Without vector instructions rounding down is a call.
+        dispatch!(level, simd => shade_row(simd, lookup, gbuffer, row * width, values));
     });
 }
 
-#[inline]
+#[inline(always)]
+fn shade_row<S: Simd>(_simd: S, lookup: &Lookup<'_>, gbuffer: &GBuffer, first: usize, values: &mut [f32]) {
+    for (value, pixel) in values.iter_mut().zip(first..) {
+        *value = shade_pixel(lookup, gbuffer, pixel);
+    }
+}
+
+/// Free points that a task looks up.
+const POINTS: usize = 1024;
+
+/// `shade.lookup` of free points: see [`Lookup::free`].
+pub fn free_points(lookup: &Lookup<'_>, points: &[Vec3], visibility: &mut [f32]) {
+    let level = Level::new();
+    visibility.par_chunks_mut(POINTS).zip(points.par_chunks(POINTS)).for_each(|(values, points)| {
+        dispatch!(level, simd => free_chunk(simd, lookup, points, values));
+    });
+}
+
+#[inline(always)]
+fn free_chunk<S: Simd>(_simd: S, lookup: &Lookup<'_>, points: &[Vec3], values: &mut [f32]) {
+    for (value, &point) in values.iter_mut().zip(points) {
+        *value = lookup.free(point);
+    }
+}
+
+#[inline(always)]
 fn shade_pixel(lookup: &Lookup<'_>, gbuffer: &GBuffer, pixel: usize) -> f32 {
     if !gbuffer.is_seen(pixel) {
         return f32::NAN;
@@ -193,5 +266,11 @@ fn shade_pixel(lookup: &Lookup<'_>, gbuffer: &GBuffer, pixel: usize) -> f32 {
     if !lookup.light.reaches(receiver) {
         return 0.0;
     }
-    lookup.surface(receiver, normal, gbuffer.depth[pixel])
+    let of = |windows| lookup.surface(windows, receiver, normal, gbuffer.depth[pixel]);
+    let visibility = of(lookup.windows);
+    if lookup.moving.is_empty() {
+        return visibility;
+    }
+    // Which part of the light each hides is not known: the product takes the parts to be independent.
+    visibility * of(lookup.moving)
 }

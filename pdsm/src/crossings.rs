@@ -17,6 +17,8 @@ pub struct AxisCrossings {
     pub first: i32,
     /// |D|, texels per unit of t.
     speed: f32,
+    /// 1/|D|.
+    inverse: f32,
     /// t of each crossing.
     pub t: Vec<f32>,
     /// Per crossing, how many of the other axis come before it.
@@ -36,21 +38,23 @@ impl AxisCrossings {
             first += 1;
         }
         let t: Vec<f32> = (first..).map(at).take_while(|&t| t <= end).collect();
-        Self { sign, first, speed, t, others: Vec::new() }
+        Self { sign, first, speed, inverse, t, others: Vec::new() }
     }
 
-    /// How many crossings have t ≤ `depth`; all for an infinite one.
-    #[inline]
-    pub fn passed(&self, depth: f32) -> u32 {
-        let guess = (depth * self.speed + 0.5).floor() - self.first as f32;
-        let mut count = guess.clamp(0.0, self.t.len() as f32) as usize;
-        while count < self.t.len() && self.t[count] <= depth {
-            count += 1;
-        }
-        while count > 0 && self.t[count - 1] > depth {
-            count -= 1;
-        }
-        count as u32
+    /// How many crossings have t ≤ `depth`, and how many t < `depth`; all for an infinite one. Without branches, so that a
+    /// loop over it becomes vector code.
+    #[inline(always)]
+    pub fn passed_both(&self, depth: f32) -> [u32; 2] {
+        let at = |h: f32| (h + 0.5) * self.inverse;
+        // The guess is off by one at most: it rounds a number below 2²³.
+        let guess = (depth * self.speed + 0.5).floor();
+        let guess = if at(guess) <= depth { guess + 1.0 } else { guess };
+        let passed = if at(guess - 1.0) > depth { guess - 1.0 } else { guess };
+        let count = passed - self.first as f32;
+        let length = self.t.len() as f32;
+        let is_on = (at(passed - 1.0) == depth) & (count >= 1.0) & (count <= length);
+        let until = count.max(0.0).min(length) as i32 as u32;
+        [until, until - u32::from(is_on)]
     }
 
     /// Offset in texels after `count` crossings.
@@ -131,11 +135,16 @@ mod tests {
     fn passed_counts_what_lies_at_or_before() {
         let axis = AxisCrossings::new(-7.3, -3.0, 1.0);
         for (index, &t) in axis.t.iter().enumerate() {
-            assert_eq!(axis.passed(t), index as u32 + 1);
-            assert_eq!(axis.passed(t.next_down()), index as u32);
+            let index = index as u32;
+            assert_eq!(axis.passed_both(t), [index + 1, index]);
+            assert_eq!(axis.passed_both(t.next_down()), [index; 2]);
+            assert_eq!(axis.passed_both(t.next_up()), [index + 1; 2]);
         }
-        assert_eq!(axis.passed(f32::INFINITY), axis.t.len() as u32);
-        assert_eq!(axis.passed(f32::NEG_INFINITY), 0);
+        let all = axis.t.len() as u32;
+        assert_eq!(axis.passed_both(f32::INFINITY), [all; 2]);
+        assert_eq!(axis.passed_both(f32::NEG_INFINITY), [0; 2]);
+        // No speed, no crossings.
+        assert_eq!(AxisCrossings::new(0.0, -3.0, 1.0).passed_both(0.5), [0; 2]);
     }
 
     #[test]

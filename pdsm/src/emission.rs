@@ -8,6 +8,10 @@
 //! before `s_after` these are the crossings A ≤ j < B, exits, or B ≤ j < A, entries: an interval again found by
 //! arithmetic. Where neighbours lie between the same crossings it is empty.
 
+use std::ops::Range;
+
+use fearless_simd::{Level, Simd, dispatch};
+
 use crate::crossings::{AxisCrossings, Crossings};
 use crate::events::{Event, EventStrips};
 use crate::grid::{DepthGrid, PixelGrid};
@@ -19,26 +23,76 @@ struct Passed {
     until: Vec<u32>,
     /// With t < s.
     before: Vec<u32>,
+    /// Where something is seen; elsewhere all crossings are passed.
+    seen: Range<usize>,
 }
 
 impl Passed {
-    fn fill(&mut self, axis: &AxisCrossings, depths: &[f32]) {
-        self.until.clear();
-        self.before.clear();
-        for &depth in depths {
-            let until = axis.passed(depth);
-            let is_on = until > 0 && axis.t[until as usize - 1] == depth;
-            self.until.push(until);
-            self.before.push(until - u32::from(is_on));
+    /// Of a row in which nothing is seen.
+    fn clear(&mut self, axis: &AxisCrossings, width: usize) {
+        for counts in [&mut self.until, &mut self.before] {
+            counts.clear();
+            counts.resize(width, axis.t.len() as u32);
         }
+        self.seen = 0..0;
+    }
+
+    fn fill(&mut self, level: Level, axis: &AxisCrossings, depths: &[f32], seen: Range<usize>) {
+        for counts in [&mut self.until, &mut self.before] {
+            counts[self.seen.clone()].fill(axis.t.len() as u32);
+        }
+        let (until, before) = (&mut self.until[seen.clone()], &mut self.before[seen.clone()]);
+        let depths = &depths[seen.clone()];
+        dispatch!(level, simd => fill(simd, axis, depths, until, before));
+        self.seen = seen;
     }
 }
 
+#[inline(always)]
+fn fill<S: Simd>(_simd: S, axis: &AxisCrossings, depths: &[f32], until: &mut [u32], before: &mut [u32]) {
+    let counts = until.iter_mut().zip(before);
+    for (&depth, (until, before)) in depths.iter().zip(counts) {
+        [*until, *before] = axis.passed_both(depth);
+    }
+}
+
+/// A crossing as events need it.
+#[derive(Clone, Copy, Debug)]
+struct Move {
+    /// From the texel that a ray leaves by this crossing to the one it is in at t = 0.
+    back: [i32; 2],
+    /// t of the crossing, of an entry and of an exit.
+    events: [Event; 2],
+}
+
 /// A thread's buffers, kept from map to map.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct EmissionScratch {
+    level: Level,
     x: Passed,
     y: [Passed; 2],
+    moves: [Vec<Move>; 2],
+}
+
+impl Default for EmissionScratch {
+    fn default() -> Self {
+        Self { level: Level::new(), x: Passed::default(), y: Default::default(), moves: Default::default() }
+    }
+}
+
+/// Where events go.
+struct Output<'a> {
+    grid: PixelGrid,
+    events: &'a mut EventStrips,
+}
+
+impl Output<'_> {
+    #[inline(always)]
+    fn push(&mut self, column: i32, row: i32, event: Event) {
+        if let (Some(column), Some(row)) = (self.grid.pixel(column), self.grid.pixel(row)) {
+            self.events.push(column, row, event);
+        }
+    }
 }
 
 /// Adds the events that `map` makes in all pixels of a PDSM. With `skip` rows in which nothing is, beside another such
@@ -53,89 +107,125 @@ pub fn emit_events(
 ) -> u64 {
     let Crossings { x, y } = crossings;
     let size = map.size() as i32;
+    let width = map.size() as usize + 2;
     let mut skipped = 0;
-    let EmissionScratch { x: along_x, y: [above, here] } = scratch;
-    above.fill(y, map.bordered_row(-1));
+    let EmissionScratch { level, x: along_x, y: [above, here], moves } = scratch;
+    let moved = |count: u32, axis: &AxisCrossings| axis.offset(count);
+    for (side, moves) in moves.iter_mut().enumerate() {
+        let axis = if side == 0 { x } else { y };
+        moves.clear();
+        moves.extend(axis.t.iter().zip(&axis.others).zip(0..).map(|((&t, &other), j)| Move {
+            back: if side == 0 { [moved(j, x), moved(other, y)] } else { [moved(other, x), moved(j, y)] },
+            events: [Event::new(t, false), Event::new(t, true)],
+        }));
+    }
+    let mut output = Output { grid, events };
+    above.clear(y, width);
+    here.clear(y, width);
+    along_x.clear(x, width);
+    // All of a row where nothing is left out.
+    let seen = |row: i32| if skip { map.seen(row) } else { 0..width };
+    above.fill(*level, y, map.bordered_row(-1), seen(-1));
     for row in 0..=size {
-        if skip && map.is_row_empty(row - 1) && map.is_row_empty(row) {
+        let (before, now) = (seen(row - 1), seen(row));
+        if before.is_empty() && now.is_empty() {
             // `above` is that of an empty row, as this one's would be.
             skipped += 1;
             continue;
         }
         let depths = map.bordered_row(row);
-        here.fill(y, depths);
-        if row < size {
-            along_x.fill(x, depths);
-            emit_tops(depths, row, grid, crossings, [along_x, here], events);
-            emit_borders_x(along_x, row, grid, crossings, events);
+        here.fill(*level, y, depths, now.clone());
+        if row < size && !now.is_empty() {
+            along_x.fill(*level, x, depths, now.clone());
+            emit_tops(&depths[now.clone()], now.start, row, crossings, [along_x, here], &mut output);
+            // Neighbours of what is seen, too.
+            let left = now.start.saturating_sub(1)..now.end.min(width - 1);
+            emit_borders_x(along_x, left, row, crossings, &moves[0], &mut output);
         }
-        emit_borders_y([above, here], row, grid, crossings, events);
+        let either = match (before.is_empty(), now.is_empty()) {
+            (true, _) => now,
+            (_, true) => before,
+            _ => before.start.min(now.start)..before.end.max(now.end),
+        };
+        emit_borders_y([above, here], either, row, crossings, &moves[1], &mut output);
         std::mem::swap(above, here);
     }
     skipped
 }
 
-#[inline]
-fn push(grid: PixelGrid, texel: [i32; 2], event: Event, events: &mut EventStrips) {
-    if let (Some(column), Some(row)) = (grid.pixel(texel[0]), grid.pixel(texel[1])) {
-        events.push(column, row, event);
-    }
-}
-
 /// Entries inside a texel, at its own depth. A depth that lies on a crossing is the border's affair.
+#[inline(always)]
 fn emit_tops(
     depths: &[f32],
+    start: usize,
     row: i32,
-    grid: PixelGrid,
     crossings: &Crossings,
     [x, y]: [&Passed; 2],
-    events: &mut EventStrips,
+    output: &mut Output<'_>,
 ) {
-    for (index, &depth) in depths.iter().enumerate() {
-        let (passed_x, passed_y) = (x.until[index], y.until[index]);
-        let is_inside = depth < f32::INFINITY && passed_x == x.before[index] && passed_y == y.before[index];
-        if is_inside {
-            let ray = [index as i32 - 1 - crossings.x.offset(passed_x), row - crossings.y.offset(passed_y)];
-            push(grid, ray, Event::new(depth, false), events);
+    let seen = start..start + depths.len();
+    let along_x = x.until[seen.clone()].iter().zip(&x.before[seen.clone()]);
+    let along_y = y.until[seen.clone()].iter().zip(&y.before[seen]);
+    let columns = start as i32 - 1..;
+    for (((&depth, (&until_x, &before_x)), (&until_y, &before_y)), column) in
+        depths.iter().zip(along_x).zip(along_y).zip(columns)
+    {
+        if depth < f32::INFINITY && until_x == before_x && until_y == before_y {
+            let [dx, dy] = [crossings.x.offset(until_x), crossings.y.offset(until_y)];
+            output.push(column - dx, row - dy, Event::new(depth, false));
         }
     }
 }
 
-/// Changes where rays pass from column to column.
+/// Changes where rays pass from column to column, for these places as the left ones.
+#[inline(always)]
 fn emit_borders_x(
     passed: &Passed,
+    left: Range<usize>,
     row: i32,
-    grid: PixelGrid,
     crossings: &Crossings,
-    events: &mut EventStrips,
+    moves: &[Move],
+    output: &mut Output<'_>,
 ) {
-    let Crossings { x, y } = crossings;
-    for left in 0..passed.until.len() - 1 {
-        let (from, to) = if x.sign > 0 { (left, left + 1) } else { (left + 1, left) };
-        let (a, b) = (passed.until[from], passed.before[to]);
-        for j in a.min(b)..a.max(b) {
-            let ray = [from as i32 - 1 - x.offset(j), row - y.offset(x.others[j as usize])];
-            push(grid, ray, Event::new(x.t[j as usize], a < b), events);
-        }
+    let right = left.start + 1..left.end + 1;
+    let (from, to, first) = if crossings.x.sign > 0 {
+        (left.clone(), right, left.start)
+    } else {
+        (right.clone(), left, right.start)
+    };
+    let pairs = passed.until[from].iter().zip(&passed.before[to]);
+    for ((&a, &b), column) in pairs.zip(first as i32 - 1..) {
+        emit_moves(a, b, column, row, moves, output);
     }
 }
 
-/// Changes where rays pass from row to row: between `row` − 1 and `row`.
+/// Changes where rays pass from row to row, between `row` − 1 and `row`, at these places.
+#[inline(always)]
 fn emit_borders_y(
     [above, here]: [&Passed; 2],
+    places: Range<usize>,
     row: i32,
-    grid: PixelGrid,
     crossings: &Crossings,
-    events: &mut EventStrips,
+    moves: &[Move],
+    output: &mut Output<'_>,
 ) {
-    let Crossings { x, y } = crossings;
-    let (from, to, from_row) = if y.sign > 0 { (above, here, row - 1) } else { (here, above, row) };
-    for index in 0..from.until.len() {
-        let (a, b) = (from.until[index], to.before[index]);
-        for j in a.min(b)..a.max(b) {
-            let ray = [index as i32 - 1 - x.offset(y.others[j as usize]), from_row - y.offset(j)];
-            push(grid, ray, Event::new(y.t[j as usize], a < b), events);
-        }
+    let (from, to, from_row) = if crossings.y.sign > 0 { (above, here, row - 1) } else { (here, above, row) };
+    let first = places.start as i32 - 1;
+    let pairs = from.until[places.clone()].iter().zip(&to.before[places]);
+    for ((&a, &b), column) in pairs.zip(first..) {
+        emit_moves(a, b, column, from_row, moves, output);
+    }
+}
+
+/// The crossings from `a` up to `b` are exits, or from `b` up to `a` entries, of rays that leave this texel.
+#[inline(always)]
+fn emit_moves(a: u32, b: u32, column: i32, row: i32, moves: &[Move], output: &mut Output<'_>) {
+    if a == b {
+        return;
+    }
+    let is_exit = usize::from(a < b);
+    for Move { back, events } in &moves[a.min(b) as usize..a.max(b) as usize] {
+        output.push(column - back[0], row - back[1], events[is_exit]);
     }
 }
 

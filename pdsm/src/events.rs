@@ -44,16 +44,22 @@ pub struct PlacedEvent {
 #[derive(Clone, Debug)]
 pub struct EventStrips {
     size: u32,
-    rows: u32,
+    /// Rows of a strip are 2 to this power.
+    row_bits: u32,
     strips: Vec<Vec<PlacedEvent>>,
+}
+
+/// Rows of a strip are 2 to this power. Some 32 strips: enough to share among threads, few enough to be written to side by
+/// side.
+fn row_bits(size: u32) -> u32 {
+    size.div_ceil(32).max(1).next_power_of_two().trailing_zeros()
 }
 
 impl EventStrips {
     /// Strips of a PDSM of `size` × `size` pixels.
     pub fn new(size: u32) -> Self {
-        // Some 32 strips: enough to share among threads, few enough to be written to side by side.
-        let rows = size.div_ceil(32).max(1);
-        Self { size, rows, strips: vec![Vec::new(); size.div_ceil(rows) as usize] }
+        let row_bits = row_bits(size);
+        Self { size, row_bits, strips: vec![Vec::new(); size.div_ceil(1 << row_bits) as usize] }
     }
 
     /// Pixels a side of the PDSM.
@@ -64,9 +70,17 @@ impl EventStrips {
     /// Adds an event of the pixel in column `x`, row `y`, both below [`size`](Self::size).
     #[inline]
     pub fn push(&mut self, x: u32, y: u32, event: Event) {
-        let strip = y / self.rows;
-        let pixel = (y - strip * self.rows) * self.size + x;
+        let strip = y >> self.row_bits;
+        let pixel = (y - (strip << self.row_bits)) * self.size + x;
         self.strips[strip as usize].push(PlacedEvent { pixel, event });
+    }
+
+    /// Strip and pixel in it of column `x`, row `y` of a PDSM of `size` × `size` pixels.
+    #[inline]
+    pub fn place(size: u32, x: u32, y: u32) -> (usize, u32) {
+        let row_bits = row_bits(size);
+        let strip = y >> row_bits;
+        (strip as usize, (y - (strip << row_bits)) * size + x)
     }
 
     /// Events in all.
@@ -86,7 +100,7 @@ impl EventStrips {
 
     /// Rows of strip `index`.
     pub fn strip_rows(&self, index: usize) -> u32 {
-        (self.size - index as u32 * self.rows).min(self.rows)
+        (self.size - ((index as u32) << self.row_bits)).min(1 << self.row_bits)
     }
 
     /// Events of strip `index`, in the order they came.

@@ -3,8 +3,10 @@
 
 use rayon::prelude::*;
 
-use crate::compression::{Node, compress, evaluate};
+use crate::compression::{Compressor, ErrorBound};
 use crate::events::{EventStrips, SortedStrip};
+use crate::nodes::{Node, Nodes};
+use crate::surfaces::{Surface, Surfaces};
 
 /// The functions of a PDSM of n × n pixels.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -13,7 +15,7 @@ pub struct Functions {
     size: u32,
     /// n² + 1 numbers: where each pixel's nodes start in [`nodes`](Self::nodes), and their end.
     index: Vec<u32>,
-    nodes: Vec<Node>,
+    nodes: Nodes,
     statistics: Statistics,
 }
 
@@ -31,7 +33,15 @@ pub struct Statistics {
 impl Functions {
     /// Sorts and compresses the events of `views` maps, given in any number of parts: the sum of the parts counts, not
     /// how they are split.
-    pub fn new(size: u32, parts: &[EventStrips], views: u32, max_error: f32) -> Self {
+    ///
+    /// With `surfaces` the functions are right at the depths of those alone.
+    pub fn new(
+        size: u32,
+        parts: &[EventStrips],
+        views: u32,
+        bound: ErrorBound,
+        surfaces: Option<&Surfaces>,
+    ) -> Self {
         struct Strip {
             /// Nodes per pixel.
             counts: Vec<u32>,
@@ -41,7 +51,7 @@ impl Functions {
         let layout = EventStrips::new(size);
         let strips: Vec<Strip> = (0..layout.strip_count())
             .into_par_iter()
-            .map_init(SortedStrip::default, |sorted, index| {
+            .map_init(<(SortedStrip, Compressor)>::default, |(sorted, compressor), index| {
                 let events: Vec<_> = parts.iter().map(|part| part.strip(index)).collect();
                 let pixels = (size * layout.strip_rows(index)) as usize;
                 sorted.sort(pixels, &events);
@@ -50,9 +60,18 @@ impl Functions {
                     nodes: Vec::new(),
                     statistics: Statistics::default(),
                 };
+                let mut asked = surfaces.map_or(&[] as &[Surface], |surfaces| surfaces.strip(index));
                 for pixel in 0..pixels {
                     let (events, start) = (sorted.pixel(pixel), strip.nodes.len());
-                    compress(events, views, max_error, &mut strip.nodes);
+                    if surfaces.is_some() {
+                        let end = asked.partition_point(|surface| surface.pixel as usize <= pixel);
+                        let (own, rest) = asked.split_at(end);
+                        let own = own.iter().map(|surface| surface.range);
+                        compressor.compress_at(events, own, views, bound, &mut strip.nodes);
+                        asked = rest;
+                    } else {
+                        compressor.compress(events, views, bound, &mut strip.nodes);
+                    }
                     let count = (strip.nodes.len() - start) as u32;
                     strip.counts.push(count);
                     let statistics = &mut strip.statistics;
@@ -65,21 +84,51 @@ impl Functions {
             .collect();
         let mut functions = Self { size, ..Self::default() };
         functions.index.reserve(size as usize * size as usize + 1);
-        functions.nodes.reserve(strips.iter().map(|strip| strip.nodes.len()).sum());
+        let mut nodes = Vec::with_capacity(strips.iter().map(|strip| strip.nodes.len()).sum());
         let mut start = 0;
         for strip in &strips {
             for count in &strip.counts {
                 functions.index.push(start);
                 start += count;
             }
-            functions.nodes.extend_from_slice(&strip.nodes);
+            nodes.extend_from_slice(&strip.nodes);
             let statistics = &mut functions.statistics;
             statistics.events += strip.statistics.events;
             statistics.most_events = statistics.most_events.max(strip.statistics.most_events);
             statistics.most_nodes = statistics.most_nodes.max(strip.statistics.most_nodes);
         }
         functions.index.push(start);
+        functions.nodes = Nodes::Full(nodes);
         functions
+    }
+
+    /// Functions that were kept as they lie in memory. `None` unless there are `size`² + 1 entries of the index, ascending
+    /// from 0 to the number of nodes, and each function's nodes are finite and ascend.
+    pub fn from_parts(size: u32, index: Vec<u32>, nodes: Nodes, statistics: Statistics) -> Option<Self> {
+        let pixels = (size as usize).checked_mul(size as usize)?;
+        let is_whole = Some(index.len()) == pixels.checked_add(1)
+            && index[0] == 0
+            && index[pixels] as usize == nodes.len()
+            && index.is_sorted();
+        let is_function = |pair: &[u32]| {
+            let mut last = f32::NEG_INFINITY;
+            (pair[0] as usize..pair[1] as usize).all(|place| {
+                let node = nodes.get(place);
+                let ascends = node.t.is_finite() && node.visibility.is_finite() && node.t >= last;
+                last = node.t;
+                ascends
+            })
+        };
+        (is_whole && index.windows(2).all(is_function)).then_some(Self { size, index, nodes, statistics })
+    }
+
+    /// The same functions with 16 bits a number.
+    pub fn into_packed(self) -> Self {
+        let nodes = match self.nodes {
+            Nodes::Full(nodes) => Nodes::packed(&nodes),
+            packed @ Nodes::Packed(..) => packed,
+        };
+        Self { nodes, ..self }
     }
 
     /// Pixels a side.
@@ -88,7 +137,7 @@ impl Functions {
     }
 
     /// All nodes, pixel by pixel.
-    pub fn nodes(&self) -> &[Node] {
+    pub fn nodes(&self) -> &Nodes {
         &self.nodes
     }
 
@@ -109,7 +158,24 @@ impl Functions {
 
     /// Bytes held.
     pub fn bytes(&self) -> u64 {
-        (size_of_val(self.index.as_slice()) + size_of_val(self.nodes.as_slice())) as u64
+        (size_of_val(self.index.as_slice()) + size_of_val(self.nodes.words())) as u64
+    }
+
+    /// V of the pixel in column `x`, row `y`, of its right neighbour, and of the two below, each at its own depth.
+    #[inline(always)]
+    pub fn four(&self, x: i32, y: i32, t: [f32; 4]) -> [f32; 4] {
+        let last = self.size as i32 - 1;
+        if x < 0 || y < 0 || x >= last || y >= last {
+            let at = |i: i32| self.visibility(x + i % 2, y + i / 2, t[i as usize]);
+            return [at(0), at(1), at(2), at(3)];
+        }
+        let place = y as usize * self.size as usize + x as usize;
+        let starts = |place: usize| {
+            let starts = &self.index[place..place + 3];
+            [[starts[0], starts[1]], [starts[1], starts[2]]]
+        };
+        let ([a, b], [c, d]) = (starts(place), starts(place + self.size as usize));
+        self.nodes.evaluate_four([a, b, c, d], t)
     }
 
     /// V at `t` along the ray of the pixel in column `x`, row `y`; 1 outside of the PDSM, where no shadow falls.
@@ -120,6 +186,6 @@ impl Functions {
             return 1.0;
         }
         let pixel = y as usize * self.size as usize + x as usize;
-        evaluate(&self.nodes[self.index[pixel] as usize..self.index[pixel + 1] as usize], t)
+        self.nodes.evaluate(self.index[pixel] as usize..self.index[pixel + 1] as usize, t)
     }
 }

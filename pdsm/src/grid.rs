@@ -44,33 +44,57 @@ pub struct DepthGrid {
     size: u32,
     /// (`size` + 2)², row by row; infinite where nothing is seen.
     depth: Vec<f32>,
-    /// Per row with its borders, whether there is nothing in it.
-    is_empty: Vec<bool>,
+    /// Per row with its borders, from where to where something is seen: places in the bordered row.
+    seen: Vec<[u32; 2]>,
 }
 
 impl DepthGrid {
-    /// Takes the depths of a map of `size` × `size` texels, row by row, through `t_of`, which must map "nothing" to
-    /// infinity. Keeps its memory from map to map.
-    pub fn fill(&mut self, size: u32, depths: &[f32], t_of: impl Fn(f32) -> f32) {
-        let side = size as usize;
+    /// Makes it a map of `size` × `size` texels in which nothing is seen. Keeps its memory from map to map.
+    pub fn clear(&mut self, size: u32) {
+        let side = size as usize + 2;
         self.size = size;
         self.depth.clear();
-        self.depth.resize((side + 2) * (side + 2), f32::INFINITY);
+        self.depth.resize(side * side, f32::INFINITY);
+        self.seen.clear();
+        self.seen.resize(side, [0; 2]);
+    }
+
+    /// All depths with the border, row by row, to be drawn into; then [`drawn`](Self::drawn) must be called. The border
+    /// must stay infinite.
+    pub fn bordered_mut(&mut self) -> &mut [f32] {
+        &mut self.depth
+    }
+
+    /// Looks where something is.
+    pub fn drawn(&mut self) {
+        let side = self.size as usize + 2;
+        for (seen, row) in self.seen.iter_mut().zip(self.depth.chunks_exact(side)) {
+            let first = row.iter().position(|&t| t < f32::INFINITY);
+            let last = row.iter().rposition(|&t| t < f32::INFINITY);
+            *seen = first.zip(last).map_or([0; 2], |(first, last)| [first as u32, last as u32 + 1]);
+        }
+    }
+
+    /// Takes the depths of a map of `size` × `size` texels, row by row, through `t_of`, which must map "nothing" to
+    /// infinity.
+    pub fn fill(&mut self, size: u32, depths: &[f32], t_of: impl Fn(f32) -> f32) {
+        self.clear(size);
+        let side = size as usize;
         for (row, depths) in depths.chunks_exact(side.max(1)).take(side).enumerate() {
             let start = (row + 1) * (side + 2) + 1;
             for (into, &depth) in self.depth[start..start + side].iter_mut().zip(depths) {
                 *into = t_of(depth);
             }
         }
-        self.is_empty.clear();
-        self.is_empty
-            .extend(self.depth.chunks_exact(side + 2).map(|row| row.iter().all(|&t| t == f32::INFINITY)));
+        self.drawn();
     }
 
-    /// Whether there is nothing in row `row`, −1 to `size`.
+    /// From where to where something is seen in row `row`, −1 to `size`: places in its
+    /// [`bordered_row`](Self::bordered_row). Empty where there is nothing.
     #[inline]
-    pub fn is_row_empty(&self, row: i32) -> bool {
-        self.is_empty[(row + 1) as usize]
+    pub fn seen(&self, row: i32) -> std::ops::Range<usize> {
+        let [first, end] = self.seen[(row + 1) as usize];
+        first as usize..end as usize
     }
 
     /// Texels a side, without the border.

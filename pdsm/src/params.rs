@@ -3,6 +3,30 @@
 use scene_core::technique::{Params, Preset, Setting, SettingKind};
 use serde::{Deserialize, Serialize};
 
+use crate::compression::ErrorBound;
+
+/// How numbers of the functions are kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// 32 bits each.
+    #[default]
+    Full,
+    /// 16 bits each: V to 1/65,535, and depth to 1/131,070 of the range of a window's nodes.
+    Half,
+}
+
+/// What an error is measured by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ErrorMeasure {
+    /// V itself.
+    #[default]
+    Visibility,
+    /// What a display shows of it: less is allowed in the dark.
+    Display,
+}
+
 /// Settings of [`Pdsm`](crate::Pdsm).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -16,8 +40,16 @@ pub struct PdsmParams {
     pub pdsm_size: u32,
     /// How far the compressed V may be from that of the maps; below 1/(2·`views`) compression saves little.
     pub max_error: f32,
+    /// What `max_error` is measured by: V, or a picture's values, which show errors in the dark most
+    /// ([`ErrorBound`](crate::compression::ErrorBound)).
+    pub error_measure: ErrorMeasure,
     /// Interpolate between the four nearest pixels; off reads the nearest one, and costs a quarter.
     pub bilinear: bool,
+    /// Bits of the functions' numbers: `half` takes half the memory and adds 1/65,535 to the error of V, and that of
+    /// reading earlier by 1/131,070 of the functions' depth range.
+    pub precision: Precision,
+    /// Keep V at the scene's surfaces alone: fewer nodes, no free points and no objects that move.
+    pub only_surfaces: bool,
     /// Leave out what cannot change the image: rows of maps in which no caster is. Off only to measure.
     pub skip: bool,
     /// The same seed gives the same samples of the light.
@@ -26,7 +58,24 @@ pub struct PdsmParams {
 
 impl PdsmParams {
     const fn with(views: u32, size: u32, max_error: f32) -> Self {
-        Self { views, map_size: size, pdsm_size: size, max_error, bilinear: true, skip: true, seed: 0 }
+        Self {
+            views,
+            map_size: size,
+            pdsm_size: size,
+            max_error,
+            error_measure: ErrorMeasure::Visibility,
+            bilinear: true,
+            precision: Precision::Full,
+            only_surfaces: false,
+            skip: true,
+            seed: 0,
+        }
+    }
+}
+
+impl PdsmParams {
+    pub(crate) fn bound(&self) -> ErrorBound {
+        ErrorBound { largest: self.max_error, of_display: self.error_measure == ErrorMeasure::Display }
     }
 }
 
@@ -65,10 +114,28 @@ impl Params for PdsmParams {
             doc: "how far compression may move V",
         },
         Setting {
+            name: "error_measure",
+            kind: SettingKind::Choice(&["visibility", "display"]),
+            unit: "",
+            doc: "what max_error bounds: V, or what a display shows of it",
+        },
+        Setting {
             name: "bilinear",
             kind: SettingKind::Bool,
             unit: "",
             doc: "interpolate between the four nearest pixels",
+        },
+        Setting {
+            name: "precision",
+            kind: SettingKind::Choice(&["full", "half"]),
+            unit: "",
+            doc: "32 or 16 bits for each number of the functions",
+        },
+        Setting {
+            name: "only_surfaces",
+            kind: SettingKind::Bool,
+            unit: "",
+            doc: "keep V at the scene's surfaces alone: no free points, nothing that moves",
         },
         Setting {
             name: "skip",

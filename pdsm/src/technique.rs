@@ -11,6 +11,7 @@ use scene_core::technique::{
 };
 use scene_core::{GBuffer, Report, VisibilityImage};
 
+use crate::baked::{Baked, refused};
 #[cfg(feature = "gpu")]
 use crate::gpu::PdsmOnGpu;
 use crate::{Pdsm, PdsmParams, PreparedPdsm};
@@ -21,27 +22,7 @@ impl ShadowTechnique for Pdsm {
     }
 
     fn describe(&self) -> Description {
-        let support = |capability| match capability {
-            Capability::DirectionalLight
-            | Capability::Sun
-            | Capability::PointLight
-            | Capability::SpotLight
-            | Capability::RectLight
-            | Capability::DiskLight => Support::Exact,
-            Capability::SphereLight => {
-                Support::Approximate("a sphere is taken for the disk that the middle of the casters sees")
-            }
-            Capability::AlphaMask | Capability::TriangleSoup => Support::Exact,
-            Capability::FreePoints => Support::Exact,
-            Capability::Gpu if !cfg!(feature = "gpu") => {
-                Support::Unsupported("built without the feature 'gpu'")
-            }
-            Capability::Gpu => Support::Exact,
-        };
-        Description {
-            summary: SUMMARY,
-            support: Capability::ALL.map(|capability| (capability, support(capability))).to_vec(),
-        }
+        describe(&self.params)
     }
 
     fn settings(&self) -> serde_json::Value {
@@ -104,11 +85,76 @@ impl PreparedShadow for PreparedPdsm<'_> {
         if points.len() != visibility.len() {
             return Err(TechniqueError::OutputSize { expected: points.len(), got: visibility.len() });
         }
+        if self.params.only_surfaces {
+            return Err(TechniqueError::Unsupported {
+                technique: PdsmParams::TECHNIQUE,
+                input: "free points".to_owned(),
+                why: "only_surfaces keeps V at the scene's surfaces alone".to_owned(),
+            });
+        }
         Ok(PreparedPdsm::visibility_at(self, points, visibility))
     }
 
     fn survives_camera(&self) -> bool {
         true
+    }
+}
+
+/// Functions from a file take the place of those that are built.
+impl ShadowTechnique for Baked {
+    fn name(&self) -> &'static str {
+        PdsmParams::TECHNIQUE
+    }
+
+    fn describe(&self) -> Description {
+        describe(self.params())
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        self.params().to_json()
+    }
+
+    fn prepare<'a>(
+        &self,
+        query: &ShadowQuery<'a>,
+    ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError> {
+        let (prepared, report) = Baked::prepare(self, query.scene, query.light).map_err(refused)?;
+        Ok((Box::new(prepared), report))
+    }
+
+    #[cfg(feature = "gpu")]
+    fn gpu(
+        &self,
+        device: &wgpu::Device,
+        visibility: wgpu::TextureFormat,
+    ) -> Result<Box<dyn GpuShadowTechnique>, TechniqueError> {
+        Ok(Box::new(PdsmOnGpu::from_baked(device, self.clone(), visibility)))
+    }
+}
+
+fn describe(params: &PdsmParams) -> Description {
+    let only_surfaces = params.only_surfaces;
+    let support = |capability| match capability {
+        Capability::DirectionalLight
+        | Capability::Sun
+        | Capability::PointLight
+        | Capability::SpotLight
+        | Capability::RectLight
+        | Capability::DiskLight => Support::Exact,
+        Capability::SphereLight => {
+            Support::Approximate("a sphere is taken for the disk that the middle of the casters sees")
+        }
+        Capability::AlphaMask | Capability::TriangleSoup => Support::Exact,
+        Capability::FreePoints if only_surfaces => {
+            Support::Unsupported("only_surfaces keeps V at the scene's surfaces alone")
+        }
+        Capability::FreePoints => Support::Exact,
+        Capability::Gpu if !cfg!(feature = "gpu") => Support::Unsupported("built without the feature 'gpu'"),
+        Capability::Gpu => Support::Exact,
+    };
+    Description {
+        summary: SUMMARY,
+        support: Capability::ALL.map(|capability| (capability, support(capability))).to_vec(),
     }
 }
 

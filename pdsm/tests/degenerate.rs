@@ -1,7 +1,7 @@
 //! Input at the edge of what has a meaning: an answer, never a panic.
 
 use glam::{Affine3A, Vec3};
-use gnomon_pdsm::{Factory, Pdsm, PdsmParams};
+use gnomon_pdsm::{ErrorMeasure, Factory, Pdsm, PdsmParams, Precision};
 use scene_core::geometry::ObjectFlags;
 use scene_core::technique::{ShadowQuery, TechniqueFactory};
 use scene_core::{Camera, GBuffer, Light, Scene, TriangleMesh, VisibilityImage, raster};
@@ -22,7 +22,10 @@ const PARAMS: PdsmParams = PdsmParams {
     map_size: 30,
     pdsm_size: 16,
     max_error: 0.01,
+    error_measure: ErrorMeasure::Visibility,
     bilinear: true,
+    precision: Precision::Full,
+    only_surfaces: false,
     skip: true,
     seed: 0,
 };

@@ -8,7 +8,7 @@
 #![cfg(feature = "gpu")]
 
 use gnomon_pdsm::gpu::PdsmOnGpu;
-use gnomon_pdsm::{Pdsm, PdsmParams};
+use gnomon_pdsm::{ErrorMeasure, Pdsm, PdsmParams, Precision};
 use gnomon_shadow_map::receiver_plane::{plane_tolerance, view_tolerance};
 use scene_core::gpu::headless::VISIBILITY_FORMAT;
 use scene_core::gpu::{GBufferTargets, Gpu, GpuShadowQuery, HeadlessRun, Recorder, SceneBuffers, testing};
@@ -21,7 +21,10 @@ const PARAMS: PdsmParams = PdsmParams {
     map_size: 128,
     pdsm_size: 128,
     max_error: 0.02,
+    error_measure: ErrorMeasure::Visibility,
     bilinear: true,
+    precision: Precision::Full,
+    only_surfaces: false,
     skip: true,
     seed: 0,
 };
@@ -147,6 +150,37 @@ fn every_kind_of_window() {
                 check(&gpu, PdsmParams { pdsm_size, bilinear, ..PARAMS }, &case);
             }
         }
+    }
+}
+
+/// 16-bit nodes, functions at surfaces alone, and functions that were baked, with what moves beside them.
+#[test]
+fn every_kind_of_functions() {
+    let Some(gpu) = testing::gpu() else { return };
+    for name in ["street", "quads"] {
+        let mut setup = scenes::build(name, 0.4).unwrap();
+        (setup.camera.width, setup.camera.height) = (96, 72);
+        let light = setup.lights[0];
+        let case = Case { name, scene: &setup.scene, camera: &setup.camera, light };
+        let half = PdsmParams { precision: Precision::Half, ..PARAMS };
+        check(&gpu, half, &case);
+        check(&gpu, PdsmParams { only_surfaces: true, ..PARAMS }, &case);
+
+        let (baked, _) = Pdsm::new(half).bake(&setup.scene, &light);
+        let gbuffer = raster::render_gbuffer(&setup.scene, &setup.camera);
+        let mut expected = VisibilityImage::new(gbuffer.width, gbuffer.height);
+        let (on_cpu, _) = baked.prepare(&setup.scene, &light).unwrap();
+        on_cpu.shade(&gbuffer, &mut expected);
+        assert_eq!(on_cpu.moving_windows().is_empty(), name == "quads");
+        let mut view = gpu.view(&setup.scene, &setup.camera).unwrap();
+        view.upload_gbuffer(&gbuffer).unwrap();
+        let mut on_gpu = PdsmOnGpu::from_baked(&gpu.device, baked, VISIBILITY_FORMAT);
+        let run = view.run(&mut on_gpu, &light, &gbuffer).unwrap();
+        let seen = (0..gbuffer.pixel_count()).filter(|&pixel| gbuffer.is_seen(pixel)).count();
+        let pairs = run.visibility.values.iter().zip(&expected.values);
+        let differ = pairs.filter(|(a, b)| (*a - *b).abs() > 1.0 / 255.0).count();
+        println!("{name}, baked: {differ} of {seen} pixels differ");
+        assert!(differ * 1000 <= seen, "{name}, baked: {differ} of {seen} pixels differ");
     }
 }
 

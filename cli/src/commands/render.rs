@@ -1,5 +1,7 @@
-//! `gnomon render`: the shadows of one light by one technique.
+//! `gnomon render`: the shadows of one light by one technique, or as they were baked.
 
+use gnomon_pdsm::baked::Baked;
+use scene_core::ShadowTechnique;
 use scene_core::io::write;
 use scene_core::raster::render_gbuffer;
 
@@ -13,9 +15,7 @@ use crate::picture::shading::Shading;
 use crate::{backend, picture, scene_source, techniques};
 
 pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<(), CliError> {
-    let factory = techniques::find(&args.technique)?;
-    let overrides = techniques::with_seed(factory, &args.set, args.scene.seed);
-    let technique = factory.create(args.preset.as_deref(), &overrides)?;
+    let technique = technique(args)?;
     let gpu = backend::open(&[args.backend])?;
     let side = backend::side(technique.as_ref(), args.backend, gpu.is_some())
         .ok_or(CliError::NoGpuPath { technique: technique.name() })?;
@@ -23,7 +23,7 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<(), CliError> 
     let view = scene_source::view(&args.scene, console)?;
 
     let run = {
-        let _working = console.working(format!("rendering with {}", args.technique));
+        let _working = console.working(format!("rendering with {}", technique.name()));
         let gbuffer = render_gbuffer(&view.setup.scene, &view.setup.camera);
         let mut stand = Stand::new(&view, &gbuffer, gpu.as_ref());
         let run = stand.run(technique.as_ref(), (args.backend, side), 1, console)?;
@@ -58,4 +58,15 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<(), CliError> 
         milliseconds(report.shade_ms),
     );
     console.result(report, &text)
+}
+
+/// What is asked for by name, or what a file holds.
+fn technique(args: &RenderArgs) -> Result<Box<dyn ShadowTechnique>, CliError> {
+    if let Some(path) = &args.baked {
+        let baked = Baked::read(path).map_err(|source| CliError::Baked { path: path.clone(), source })?;
+        return Ok(Box::new(baked));
+    }
+    let factory = techniques::find(args.technique.as_deref().unwrap_or_default())?;
+    let overrides = techniques::with_seed(factory, &args.set, args.scene.seed);
+    Ok(factory.create(args.preset.as_deref(), &overrides)?)
 }

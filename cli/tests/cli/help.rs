@@ -22,6 +22,11 @@ fn of_render() {
 }
 
 #[test]
+fn of_bake() {
+    insta::assert_snapshot!(help(&["bake", "--help"]));
+}
+
+#[test]
 fn of_reference() {
     insta::assert_snapshot!(help(&["reference", "--help"]));
 }

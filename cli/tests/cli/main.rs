@@ -2,6 +2,7 @@
 
 mod backends;
 mod bad_input;
+mod bake;
 mod bench;
 mod compare;
 mod files;

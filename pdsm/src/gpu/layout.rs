@@ -5,9 +5,10 @@ use glam::{Vec2, Vec3};
 
 use crate::cpu::Window;
 use crate::layout::Depth;
+use crate::nodes::{DepthSteps, Nodes};
 
-/// Most windows of one light: the faces of a cube.
-pub const MOST_WINDOWS: usize = 6;
+/// Most windows of one light: the faces of a cube, and as many over casters that move.
+pub const MOST_WINDOWS: usize = 12;
 
 /// What stands for an infinite tangent: shaders need not know infinities, and no point is seen at it.
 const ANY_TAN: f32 = 1e30;
@@ -46,18 +47,31 @@ pub struct WindowUniform {
     pub first_offset: u32,
     /// Samples of the light.
     pub views: u32,
+    /// t of packed nodes: that of step 0.
+    pub t_start: f32,
+    /// t a step of packed nodes; 0 for nodes of floats.
+    pub t_step: f32,
+    /// Where the window's nodes begin in the data array, in its words.
+    pub first_word: u32,
+    /// By how much t of a node may be off.
+    pub t_error: f32,
     /// Zero.
     pub padding: [u32; 2],
 }
 
 impl WindowUniform {
-    /// What shaders need of `window`, whose pixels and samples follow `first_index` and `first_offset` others.
-    pub fn new(window: &Window, first_index: u32, first_offset: u32) -> Self {
+    /// What shaders need of `window`, whose pixels and samples follow `first_index` and `first_offset` others,
+    /// and its nodes `first_word` words.
+    pub fn new(window: &Window, first_index: u32, first_offset: u32, first_word: u32) -> Self {
         let layout = &window.layout;
         let [x, y, z] = layout.axes;
         let (focus, per_unit) = match layout.depth {
             Depth::Central { focus } => (focus, 0.0),
             Depth::Parallel { focus, per_unit } => (focus, per_unit),
+        };
+        let steps = match window.functions.nodes() {
+            Nodes::Full(_) => DepthSteps { start: 0.0, step: 0.0 },
+            Nodes::Packed(_, steps) => *steps,
         };
         Self {
             origin: layout.origin,
@@ -75,6 +89,10 @@ impl WindowUniform {
             first_index,
             first_offset,
             views: layout.offsets.len() as u32,
+            t_start: steps.start,
+            t_step: steps.step,
+            first_word,
+            t_error: window.functions.nodes().depth_error(),
             padding: [0; 2],
         }
     }
@@ -88,12 +106,12 @@ pub struct PdsmUniform {
     pub windows: [WindowUniform; MOST_WINDOWS],
     /// How many there are.
     pub count: u32,
+    /// How many of them are over casters that stand still, the first ones.
+    pub still: u32,
     /// [`plane_tolerance`](gnomon_shadow_map::receiver_plane::plane_tolerance).
     pub tolerance: f32,
     /// 1 if four pixels are read, 0 if the nearest one.
     pub bilinear: u32,
-    /// Zero.
-    pub padding: u32,
 }
 
 #[cfg(test)]
@@ -101,7 +119,6 @@ mod tests {
     use scene_core::assert_layout;
 
     use super::*;
-    use crate::compression::Node;
     use crate::gpu::shaders::SHADE;
 
     #[test]
@@ -125,10 +142,13 @@ mod tests {
                 max_tan,
                 first_index,
                 first_offset,
-                views
+                views,
+                t_start,
+                t_step,
+                first_word,
+                t_error
             ]
         );
-        assert_layout!(PdsmUniform, SHADE, "Pdsm", [windows, count, tolerance, bilinear]);
-        assert_layout!(Node, SHADE, "Node", [t, visibility]);
+        assert_layout!(PdsmUniform, SHADE, "Pdsm", [windows, count, still, tolerance, bilinear]);
     }
 }

@@ -15,19 +15,27 @@ use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Report};
 use wgpu::util::DeviceExt as _;
 
+use crate::baked::{self, Baked};
 use crate::{Pdsm, PdsmParams, PreparedPdsm};
 use layout::{MOST_WINDOWS, PdsmUniform, WindowUniform};
 
 /// The technique on one device: pipelines, and the functions of the light prepared last.
 #[derive(Debug)]
 pub struct PdsmOnGpu {
-    technique: Pdsm,
+    source: Source,
     uniform: HeldBuffer,
     own: HeldGroup,
     scene: SceneBindings,
     receivers: Receivers,
     lookup: VisibilityPass,
     prepared: Option<Prepared>,
+}
+
+/// Where functions come from.
+#[derive(Debug)]
+enum Source {
+    Built(Pdsm),
+    Baked(Box<Baked>),
 }
 
 /// What `prepare` leaves to `shade`.
@@ -41,6 +49,15 @@ struct Prepared {
 impl PdsmOnGpu {
     /// Makes the pipelines. `visibility` is the format of the texture that V is written to.
     pub fn new(device: &wgpu::Device, params: PdsmParams, visibility: wgpu::TextureFormat) -> Self {
+        Self::from_source(device, Source::Built(Pdsm::new(params)), visibility)
+    }
+
+    /// [`new`](Self::new), for functions that are there already.
+    pub fn from_baked(device: &wgpu::Device, baked: Baked, visibility: wgpu::TextureFormat) -> Self {
+        Self::from_source(device, Source::Baked(Box::new(baked)), visibility)
+    }
+
+    fn from_source(device: &wgpu::Device, source: Source, visibility: wgpu::TextureFormat) -> Self {
         let stages = wgpu::ShaderStages::FRAGMENT;
         let types = [binding::UNIFORM, binding::STORAGE, binding::STORAGE, binding::STORAGE];
         let own = HeldGroup::new(device, "penumbra deep shadow map", stages, &types);
@@ -58,21 +75,14 @@ impl PdsmOnGpu {
                 format: visibility,
             },
         );
-        Self {
-            technique: Pdsm::new(params),
-            uniform: HeldBuffer::uniform("pdsm"),
-            own,
-            scene,
-            receivers,
-            lookup,
-            prepared: None,
-        }
+        Self { source, uniform: HeldBuffer::uniform("pdsm"), own, scene, receivers, lookup, prepared: None }
     }
 
-    /// Builds the PDSM of the query's light on the CPU and copies it to the device. It holds for any camera.
+    /// Builds the PDSM of the query's light on the CPU, or takes the baked one, and copies it to the device. It holds for
+    /// any camera.
     ///
     /// # Errors
-    /// A scene without [`GpuScene::geometry`](scene_core::gpu::GpuScene::geometry); more functions than the device binds
+    /// A light or a scene that functions were not baked for; a scene without [`GpuScene::geometry`](scene_core::gpu::GpuScene::geometry); more functions than the device binds
     /// in one piece.
     pub fn prepare(
         &mut self,
@@ -85,7 +95,10 @@ impl PdsmOnGpu {
             input: "a scene on the GPU alone".to_owned(),
             why: "its maps are drawn on the CPU: hand over the geometry in memory, too".to_owned(),
         })?;
-        let (pdsm, mut report) = self.technique.prepare(geometry, query.light);
+        let (pdsm, mut report) = match &self.source {
+            Source::Built(technique) => technique.prepare(geometry, query.light),
+            Source::Baked(baked) => baked.prepare(geometry, query.light).map_err(baked::refused)?,
+        };
         report.time("prepare.upload", |_| self.upload(recorder.device, query, &pdsm))?;
         Ok(report)
     }
@@ -102,19 +115,19 @@ impl PdsmOnGpu {
     ) -> Result<(), TechniqueError> {
         self.prepared = None;
         let mut uniform = PdsmUniform {
-            count: pdsm.windows.len() as u32,
+            count: (pdsm.windows.len() + pdsm.moving.len()) as u32,
+            still: pdsm.windows.len() as u32,
             tolerance: pdsm.tolerance,
-            bilinear: u32::from(pdsm.bilinear),
+            bilinear: u32::from(pdsm.params.bilinear),
             ..bytemuck::Zeroable::zeroed()
         };
         GpuError::within("windows", uniform.count, MOST_WINDOWS as u32)?;
         let (mut index, mut nodes, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
-        for (into, window) in uniform.windows.iter_mut().zip(&pdsm.windows) {
-            *into = WindowUniform::new(window, index.len() as u32, offsets.len() as u32);
-            // Far below u32's end: what the device binds in one piece, checked below, are fewer.
-            let first = nodes.len() as u32;
-            index.extend(window.functions.index().iter().map(|&start| start.wrapping_add(first)));
-            nodes.extend_from_slice(window.functions.nodes());
+        for (into, window) in uniform.windows.iter_mut().zip(pdsm.windows.iter().chain(pdsm.moving.iter())) {
+            // Far below u32's end: what the device binds in one piece, checked below, is less.
+            *into = WindowUniform::new(window, index.len() as u32, offsets.len() as u32, nodes.len() as u32);
+            index.extend_from_slice(window.functions.index());
+            nodes.extend_from_slice(window.functions.nodes().words());
             offsets.extend_from_slice(&window.layout.offsets);
         }
         let index = storage(device, "index of functions", bytemuck::cast_slice(&index))?;

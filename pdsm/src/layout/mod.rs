@@ -89,12 +89,23 @@ impl Layout {
     #[inline]
     pub fn locate(&self, point: Vec3) -> Option<WindowPoint> {
         let local = self.local(point);
+        let farthest = self.max_tan * local.z;
+        let belongs = matches!(self.depth, Depth::Parallel { .. })
+            || (local.x.abs() <= farthest && local.y.abs() <= farthest);
+        if belongs { self.project_local(local) } else { None }
+    }
+
+    /// Where `point` lies, also if another window looks at it; `None` on and behind the light's plane.
+    #[inline]
+    pub fn project(&self, point: Vec3) -> Option<WindowPoint> {
+        self.project_local(self.local(point))
+    }
+
+    #[inline]
+    fn project_local(&self, local: Vec3) -> Option<WindowPoint> {
         let (on_window, t) = match self.depth {
             Depth::Central { focus } => {
-                let belongs = local.z > 0.0
-                    && local.x.abs() <= self.max_tan * local.z
-                    && local.y.abs() <= self.max_tan * local.z;
-                if !belongs {
+                if local.z.is_nan() || local.z <= 0.0 {
                     return None;
                 }
                 let scale = focus / local.z;
