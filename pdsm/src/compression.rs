@@ -258,14 +258,19 @@ mod tests {
     fn a_display_shows_errors_in_the_dark_most() {
         let bound = ErrorBound { largest: 0.1, of_display: true };
         assert!((bound.at(1.0) - 0.1).abs() < 1e-8 && (0.028..0.029).contains(&bound.at(0.0)));
-        // Of a ramp to the umbra and back all is within the bound of its place, and the dark takes more nodes.
-        let events: Vec<_> = (0..128).map(|i| Event::new((i * i) as f32 / 4096.0, i >= 64)).collect();
+        // V = (1 − t)² to the umbra and back: all is within the bound of its place, and the dark takes more nodes.
+        let bound = ErrorBound { largest: 0.02, of_display: true };
+        let at = |i: i32| 1.0 - (1.0 - i as f32 / 64.0).sqrt();
+        let event =
+            |i: i32| if i < 64 { Event::new(at(i), false) } else { Event::new(2.0 - at(127 - i), true) };
+        let events: Vec<_> = (0..128).map(event).collect();
+        assert!(events.is_sorted());
         let [mut nodes, mut uniform] = [Vec::new(), Vec::new()];
         Compressor::default().compress(&events, 64, bound, &mut nodes);
-        Compressor::default().compress(&events, 64, 0.1.into(), &mut uniform);
+        Compressor::default().compress(&events, 64, 0.02.into(), &mut uniform);
         assert!(nodes.len() > uniform.len());
         for i in 0..4000 {
-            let t = i as f32 / 900.0 + 1e-4;
+            let t = i as f32 / 1900.0 + 1e-4;
             let should = exact(&events, 64, t);
             assert!(f64::from((evaluate(&nodes, t) - should).abs()) <= bound.at(f64::from(should)) + 1e-5);
         }

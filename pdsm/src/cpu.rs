@@ -123,8 +123,8 @@ pub struct Lookup<'a> {
     pub moving: &'a [Window],
     /// [`gnomon_shadow_map::receiver_plane::plane_tolerance`].
     pub tolerance: f32,
-    /// Whether four pixels are read.
-    pub bilinear: bool,
+    /// Pixels that interpolation reaches along each axis: 1 reads four pixels, 0 the nearest one.
+    pub radius: u32,
 }
 
 /// Half the diagonal way from a texel's middle to its corner, in texels along each axis, and what the drawing of maps
@@ -166,7 +166,7 @@ impl Lookup<'_> {
             // The plane holds the light's middle: half of the light is below it at best.
             return layout.share_above(receiver, normal);
         }
-        let visibility = window.look_up(at.texel, before, slope, self.bilinear);
+        let visibility = window.look_up(at.texel, before, slope, self.radius);
         visibility.min(layout.share_above(receiver, normal))
     }
 
@@ -181,7 +181,7 @@ impl Lookup<'_> {
         }
         let of = |windows| {
             locate(windows, point)
-                .map_or(1.0, |(window, at)| window.look_up(at.texel, at.t, Vec2::ZERO, self.bilinear))
+                .map_or(1.0, |(window, at)| window.look_up(at.texel, at.t, Vec2::ZERO, self.radius))
         };
         of(self.windows) * of(self.moving)
     }
@@ -195,7 +195,7 @@ fn locate(windows: &[Window], point: Vec3) -> Option<(&Window, WindowPoint)> {
 impl Window {
     /// V at a position on the window, at depth `t` there and `slope` more for every texel to the side.
     #[inline(always)]
-    fn look_up(&self, texel: Vec2, t: f32, slope: Vec2, bilinear: bool) -> f32 {
+    fn look_up(&self, texel: Vec2, t: f32, slope: Vec2, radius: u32) -> f32 {
         let pixel = self.grid.from_texels(texel);
         // Far outside of the window, and for what is no number, there is nothing; the limit keeps the conversion below
         // from saturating.
@@ -204,10 +204,13 @@ impl Window {
             return 1.0;
         }
         let slope = slope * self.grid.ratio as f32;
-        if !bilinear {
+        if radius == 0 {
             let nearest = pixel.round();
             let t = t + slope.dot(nearest - pixel);
             return self.functions.visibility(nearest.x as i32, nearest.y as i32, t);
+        }
+        if radius > 1 {
+            return self.look_up_wide(pixel, t, slope, radius);
         }
         let low = pixel.floor();
         let weight = pixel - low;
@@ -216,6 +219,26 @@ impl Window {
         let [a, b, c, d] = self.functions.four(low.x as i32, low.y as i32, depths);
         let (top, bottom) = (a + (b - a) * weight.x, c + (d - c) * weight.x);
         top + (bottom - top) * weight.y
+    }
+}
+
+impl Window {
+    /// [`look_up`](Self::look_up) with a tent over 4·radius² pixels; weights along an axis sum to the radius. Each pixel is
+    /// read where its own ray meets the receiver's plane, so that a wide filter shadows no more of a plane than a narrow one.
+    fn look_up_wide(&self, pixel: Vec2, t: f32, slope: Vec2, radius: u32) -> f32 {
+        let reach = radius as f32;
+        let first = pixel.floor() - (reach - 1.0);
+        let mut sum = 0.0;
+        for row in 0..2 * radius {
+            for column in 0..2 * radius {
+                let at = first + Vec2::new(column as f32, row as f32);
+                let way = at - pixel;
+                let weight = 1.0 - way.abs() / reach;
+                let v = self.functions.visibility(at.x as i32, at.y as i32, t + slope.dot(way));
+                sum += weight.x * weight.y * v;
+            }
+        }
+        (sum / (reach * reach)).clamp(0.0, 1.0)
     }
 }
 

@@ -81,7 +81,7 @@ impl Pdsm {
         meant: impl Fn(&Object) -> bool,
         report: &mut Report,
     ) -> (Arc<[Window]>, f32) {
-        let PdsmParams { views, seed, precision, only_surfaces, skip, .. } = self.params;
+        let PdsmParams { views, seed, filter_radius, precision, only_surfaces, skip, .. } = self.params;
         let tolerance = plane_tolerance(scene.bounds(), light);
         let (map_size, grid) = self.grid();
         let (casters, (layouts, skipped)) = report.time("prepare.layout", |report| {
@@ -99,7 +99,9 @@ impl Pdsm {
                     .time("prepare.events", |_| cpu::collect_events(scene, &casters, &layout, grid, skip));
                 report.skip("map rows without casters", rows);
                 let surfaces = only_surfaces.then(|| {
-                    report.time("prepare.surfaces", |_| Surfaces::new(scene, &layout, grid, tolerance))
+                    report.time("prepare.surfaces", |_| {
+                        Surfaces::new(scene, &layout, grid, tolerance, filter_radius)
+                    })
                 });
                 let functions = report.time("prepare.functions", |_| {
                     let views = layout.steps().len() as u32;
@@ -124,8 +126,13 @@ impl PreparedPdsm<'_> {
             windows: &self.windows,
             moving: &self.moving,
             tolerance: self.tolerance,
-            bilinear: self.params.bilinear,
+            radius: self.radius(),
         }
+    }
+
+    /// Pixels that interpolation reaches: 0 for the nearest one.
+    fn radius(&self) -> u32 {
+        if self.params.bilinear { self.params.filter_radius.max(1) } else { 0 }
     }
 
     /// The windows, with their functions.

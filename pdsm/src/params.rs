@@ -45,6 +45,9 @@ pub struct PdsmParams {
     pub error_measure: ErrorMeasure,
     /// Interpolate between the four nearest pixels; off reads the nearest one, and costs a quarter.
     pub bilinear: bool,
+    /// Pixels from which interpolation reaches a point, along each axis: 1 is bilinear, more soften shadows further, at a
+    /// cost of 4·`filter_radius`² pixels.
+    pub filter_radius: u32,
     /// Bits of the functions' numbers: `half` takes half the memory and adds 1/65,535 to the error of V, and that of
     /// reading earlier by 1/131,070 of the functions' depth range.
     pub precision: Precision,
@@ -65,6 +68,7 @@ impl PdsmParams {
             max_error,
             error_measure: ErrorMeasure::Visibility,
             bilinear: true,
+            filter_radius: 1,
             precision: Precision::Full,
             only_surfaces: false,
             skip: true,
@@ -124,6 +128,12 @@ impl Params for PdsmParams {
             kind: SettingKind::Bool,
             unit: "",
             doc: "interpolate between the four nearest pixels",
+        },
+        Setting {
+            name: "filter_radius",
+            kind: SettingKind::Int { min: 1, max: 16 },
+            unit: "pixels",
+            doc: "how far interpolation reaches; 1 is bilinear, more is softer",
         },
         Setting {
             name: "precision",

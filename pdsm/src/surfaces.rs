@@ -15,8 +15,8 @@ use crate::events::EventStrips;
 use crate::grid::PixelGrid;
 use crate::layout::Layout;
 
-/// How far from a pixel's centre it is read, in pixels along each axis; rounding of positions included.
-const REACH: f32 = 1.0 + 1.0 / 64.0;
+/// What rounding of positions adds to how far from its centre a pixel is read, in pixels.
+const ROUNDING: f32 = 1.0 / 64.0;
 
 /// A camera may stand so many times the scene's diagonal away from what it sees: its distance is part of what positions
 /// are rounded by.
@@ -42,9 +42,10 @@ pub struct Surfaces {
 
 impl Surfaces {
     /// The receivers of `scene` in a window. `tolerance` is that of the lookup.
-    pub fn new(scene: &Scene, layout: &Layout, grid: PixelGrid, tolerance: f32) -> Self {
+    /// Pixels are read from up to `radius` pixels away.
+    pub fn new(scene: &Scene, layout: &Layout, grid: PixelGrid, tolerance: f32, radius: u32) -> Self {
         let tolerance = tolerance + view_tolerance(FARTHEST_CAMERA * scene.bounds().diagonal());
-        let finder = Finder { scene, layout, grid, tolerance };
+        let finder = Finder { scene, layout, grid, tolerance, reach: radius.max(1) as f32 + ROUNDING };
         let receivers = scene.objects().iter().filter(|object| object.flags.receives);
         let triangles: Vec<usize> = receivers.flat_map(|object| object.triangles.clone()).collect();
         let empty = || vec![Vec::new(); EventStrips::new(grid.size).strip_count()];
@@ -92,6 +93,8 @@ struct Finder<'a> {
     layout: &'a Layout,
     grid: PixelGrid,
     tolerance: f32,
+    /// How far from a pixel's centre it is read, in pixels along each axis.
+    reach: f32,
 }
 
 impl Finder<'_> {
@@ -114,7 +117,7 @@ impl Finder<'_> {
         let pixel = self.grid.from_texels(at.texel);
         let slope = slope * self.grid.ratio as f32;
         let places = seen.map(|at| at.map_or(Vec2::ZERO, |at| self.grid.from_texels(at.texel)));
-        let footprint = if whole { Footprint::new(places) } else { Footprint::EVERYWHERE };
+        let footprint = if whole { Footprint::new(places, self.reach) } else { Footprint::EVERYWHERE };
         let size = self.grid.size;
         for y in footprint.rows(size) {
             for x in footprint.columns(size) {
@@ -140,6 +143,7 @@ struct Footprint {
     corners: [Vec2; 3],
     low: Vec2,
     high: Vec2,
+    reach: f32,
 }
 
 impl Footprint {
@@ -147,11 +151,12 @@ impl Footprint {
         corners: [Vec2::ZERO; 3],
         low: Vec2::splat(f32::NEG_INFINITY),
         high: Vec2::splat(f32::INFINITY),
+        reach: 0.0,
     };
 
-    fn new(corners: [Vec2; 3]) -> Self {
+    fn new(corners: [Vec2; 3], reach: f32) -> Self {
         let [a, b, c] = corners;
-        Self { corners, low: a.min(b).min(c) - REACH, high: a.max(b).max(c) + REACH }
+        Self { corners, low: a.min(b).min(c) - reach, high: a.max(b).max(c) + reach, reach }
     }
 
     fn columns(&self, size: u32) -> std::ops::Range<u32> {
@@ -168,7 +173,7 @@ impl Footprint {
         let side = (b - a).perp_dot(c - a).signum();
         [(a, b), (b, c), (c, a)].into_iter().all(|(a, b)| {
             let edge = b - a;
-            side * edge.perp_dot(center - a) + REACH * edge.abs().element_sum() >= 0.0
+            side * edge.perp_dot(center - a) + self.reach * edge.abs().element_sum() >= 0.0
         })
     }
 }
@@ -185,7 +190,8 @@ mod tests {
 
     #[test]
     fn a_footprint_is_the_triangle_and_a_pixel_around() {
-        let footprint = Footprint::new([Vec2::new(2.5, 2.5), Vec2::new(12.5, 2.5), Vec2::new(2.5, 12.5)]);
+        let footprint =
+            Footprint::new([Vec2::new(2.5, 2.5), Vec2::new(12.5, 2.5), Vec2::new(2.5, 12.5)], 1.0 + ROUNDING);
         assert_eq!((footprint.columns(10), footprint.rows(64)), (2..10, 2..14));
         assert!(footprint.reaches(Vec2::new(2.0, 2.0)) && footprint.reaches(Vec2::new(8.0, 8.0)));
         assert!(!footprint.reaches(Vec2::new(9.0, 9.0)) && !footprint.reaches(Vec2::new(12.0, 12.0)));

@@ -24,6 +24,7 @@ const PARAMS: PdsmParams = PdsmParams {
     max_error: 0.01,
     error_measure: ErrorMeasure::Visibility,
     bilinear: true,
+    filter_radius: 1,
     precision: Precision::Full,
     only_surfaces: false,
     skip: true,

@@ -23,6 +23,7 @@ const PARAMS: PdsmParams = PdsmParams {
     max_error: 0.02,
     error_measure: ErrorMeasure::Visibility,
     bilinear: true,
+    filter_radius: 1,
     precision: Precision::Full,
     only_surfaces: false,
     skip: true,
@@ -164,6 +165,7 @@ fn every_kind_of_functions() {
         let case = Case { name, scene: &setup.scene, camera: &setup.camera, light };
         let half = PdsmParams { precision: Precision::Half, ..PARAMS };
         check(&gpu, half, &case);
+        check(&gpu, PdsmParams { filter_radius: 3, ..PARAMS }, &case);
         check(&gpu, PdsmParams { only_surfaces: true, ..PARAMS }, &case);
 
         let (baked, _) = Pdsm::new(half).bake(&setup.scene, &light);

@@ -12,6 +12,9 @@ use crate::layout::{Depth, Layout};
 use crate::nodes::{DepthSteps, Nodes};
 use crate::params::{ErrorMeasure, PdsmParams, Precision};
 
+/// Largest filter.
+const MOST_RADIUS: u32 = 16;
+
 /// Most windows of a light.
 const MOST_WINDOWS: u32 = 6;
 
@@ -23,12 +26,13 @@ pub(super) fn write(baked: &Baked, to: &mut Writer) {
         max_error,
         error_measure,
         bilinear,
+        filter_radius,
         precision,
         only_surfaces,
         skip,
         seed,
     } = baked.params;
-    for value in [views, map_size, pdsm_size] {
+    for value in [views, map_size, pdsm_size, filter_radius] {
         to.u32(value);
     }
     to.f32s(&[max_error]);
@@ -51,6 +55,7 @@ pub(super) fn write(baked: &Baked, to: &mut Writer) {
 /// `None` where the words are not what [`write`] makes.
 pub(super) fn read(from: &mut Reader<'_>) -> Option<Baked> {
     let [views, map_size, pdsm_size] = [from.u32()?, from.u32()?, from.u32()?];
+    let filter_radius = from.u32().filter(|radius| (1..=MOST_RADIUS).contains(radius))?;
     let [max_error] = from.finite()?;
     let [display, bilinear, half] = [from.bool()?, from.bool()?, from.bool()?];
     let [only_surfaces, skip] = [from.bool()?, from.bool()?];
@@ -64,6 +69,7 @@ pub(super) fn read(from: &mut Reader<'_>) -> Option<Baked> {
         max_error,
         error_measure,
         bilinear,
+        filter_radius,
         precision,
         only_surfaces,
         skip,

@@ -110,8 +110,8 @@ pub struct PdsmUniform {
     pub still: u32,
     /// [`plane_tolerance`](gnomon_shadow_map::receiver_plane::plane_tolerance).
     pub tolerance: f32,
-    /// 1 if four pixels are read, 0 if the nearest one.
-    pub bilinear: u32,
+    /// Pixels that interpolation reaches: 1 reads four pixels, 0 the nearest one.
+    pub radius: u32,
 }
 
 #[cfg(test)]
@@ -149,6 +149,6 @@ mod tests {
                 t_error
             ]
         );
-        assert_layout!(PdsmUniform, SHADE, "Pdsm", [windows, count, still, tolerance, bilinear]);
+        assert_layout!(PdsmUniform, SHADE, "Pdsm", [windows, count, still, tolerance, radius]);
     }
 }

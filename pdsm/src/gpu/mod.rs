@@ -118,7 +118,7 @@ impl PdsmOnGpu {
             count: (pdsm.windows.len() + pdsm.moving.len()) as u32,
             still: pdsm.windows.len() as u32,
             tolerance: pdsm.tolerance,
-            bilinear: u32::from(pdsm.params.bilinear),
+            radius: pdsm.radius(),
             ..bytemuck::Zeroable::zeroed()
         };
         GpuError::within("windows", uniform.count, MOST_WINDOWS as u32)?;
