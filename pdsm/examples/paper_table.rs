@@ -5,6 +5,7 @@
 use std::path::Path;
 use std::time::Instant;
 
+use gnomon_pdsm::compression::Segments;
 use gnomon_pdsm::functions::Functions;
 use gnomon_pdsm::{Pdsm, PdsmParams};
 use scene_core::{SceneSetup, VisibilityImage, io, raster, scenes};
@@ -34,10 +35,17 @@ fn peak_since_last_call() -> Option<f64> {
     Some(kib / 1024.0)
 }
 
-fn row(name: &str, mut setup: SceneSetup, views: u32, size: u32, paper: Option<&Paper>) {
+fn row(name: &str, mut setup: SceneSetup, views: u32, size: u32, segments: Segments, paper: Option<&Paper>) {
     (setup.camera.width, setup.camera.height) = (512, 512);
     let (scene, light) = (&setup.scene, &setup.lights[0]);
-    let params = PdsmParams { views, map_size: size, pdsm_size: size, max_error: 0.02, ..Default::default() };
+    let params = PdsmParams {
+        views,
+        map_size: size,
+        pdsm_size: size,
+        max_error: 0.02,
+        segments,
+        ..Default::default()
+    };
     peak_since_last_call();
     let before = peak_since_last_call();
     let (_, first) = Pdsm::new(params).prepare(scene, light);
@@ -62,7 +70,7 @@ fn row(name: &str, mut setup: SceneSetup, views: u32, size: u32, paper: Option<&
     };
     let none = || "–".to_owned();
     println!(
-        "| {name} | {} | {views} | {size}² | {seconds:.3} s | {} | {:.1} / {:.1} | {} / {} | {} | {:.1} | {} | {lookup:.1} ms | {} |",
+        "| {name}, {segments:?} | {} | {views} | {size}² | {seconds:.3} s | {} | {:.1} / {:.1} | {} / {} | {} | {:.1} | {} | {lookup:.1} ms | {} |",
         scene.triangles().len(),
         paper.map_or_else(none, |p| format!("{:.0} s, {:.0}×", p.seconds, p.seconds / seconds)),
         sum(|f| f.statistics().events) as f64 / pixels,
@@ -84,7 +92,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
     if arguments.is_empty() {
         for (name, views, size, paper) in &ROWS {
-            row(name, scenes::build(name, 0.0)?, *views, *size, Some(paper));
+            for segments in [Segments::Greedy, Segments::Fewest] {
+                row(name, scenes::build(name, 0.0)?, *views, *size, segments, Some(paper));
+            }
         }
     }
     for argument in &arguments {
@@ -93,7 +103,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         } else {
             scenes::build(argument, 0.0)?
         };
-        row(argument, setup, 64, 512, None);
+        row(argument, setup, 64, 512, Segments::Fewest, None);
     }
     Ok(())
 }

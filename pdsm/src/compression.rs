@@ -1,13 +1,17 @@
 //! Step functions made short: compression of deep shadow maps (Lokovic and Veach 2000, section 3.3; section 3.2 of the
-//! PDSM paper), with the fewest segments that there can be.
+//! PDSM paper).
 //!
 //! V along a ray is a step function. It is replaced by segments, each as long as a straight line can stay within the
 //! error bound of the function on either side. The papers draw each segment from the end of the one before, which is
-//! settled when the next is looked for; here segments meet anywhere within the bound (`tunnel.rs`). A step that is higher
+//! settled when the next is looked for (`greedy.rs`); there are fewest if segments may meet anywhere within the bound
+//! (`tunnel.rs`). A step that is higher
 //! than twice the bound cannot be passed by any line and stays a step: two nodes at one depth. One shadow map of k makes
 //! steps of 1/k, so below a bound of 1/(2k) every step costs two nodes.
 
+use serde::{Deserialize, Serialize};
+
 use crate::events::Event;
+use crate::greedy::Greedy;
 use crate::nodes::Node;
 use crate::tunnel::{Gate, Tunnel};
 
@@ -44,6 +48,32 @@ impl From<f32> for ErrorBound {
     }
 }
 
+/// Which segments are looked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Segments {
+    /// Each as long as it can be from the end of the one before, as in the papers: the fastest to find.
+    #[default]
+    Greedy,
+    /// The fewest that there can be, meeting anywhere within the bound: for what is kept in files and looked up often.
+    Fewest,
+}
+
+/// How functions are made short.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Compression {
+    /// How far they may be from the true ones.
+    pub bound: ErrorBound,
+    /// Which segments are looked for.
+    pub segments: Segments,
+}
+
+impl From<f32> for Compression {
+    fn from(largest: f32) -> Self {
+        Self { bound: largest.into(), segments: Segments::default() }
+    }
+}
+
 /// Compresses functions one by one, keeping its memory.
 #[derive(Clone, Debug, Default)]
 pub struct Compressor {
@@ -60,11 +90,20 @@ impl Compressor {
     /// Appends to `nodes` the function that `events`, ascending, of `views` maps make: V is 1 before the first node,
     /// within `bound` of the true step function everywhere, and stays what it is after the last. A
     /// function that is nowhere farther from 1 leaves no node.
-    pub fn compress(&mut self, events: &[Event], views: u32, bound: ErrorBound, nodes: &mut Vec<Node>) {
+    pub fn compress(
+        &mut self,
+        events: &[Event],
+        views: u32,
+        compression: Compression,
+        nodes: &mut Vec<Node>,
+    ) {
         let start = nodes.len();
-        self.begin(bound, views);
+        self.begin(compression.bound, views);
         let mut steps = Steps::new(events, views);
         let mut before = 0;
+        if compression.segments == Segments::Greedy {
+            return self.greedy(steps, start, nodes);
+        }
         while let Some((t, after)) = steps.next() {
             if after != before {
                 self.step(t, [before, after], false, nodes);
@@ -105,6 +144,27 @@ impl Compressor {
             }
         }
         self.end(value, start, nodes);
+    }
+
+    fn greedy(&mut self, mut steps: Steps<'_>, start: usize, nodes: &mut Vec<Node>) {
+        let Some(first) = steps.events.first() else { return };
+        let mut line = Greedy::new(Node { t: first.t(), visibility: 1.0 }, nodes);
+        let mut before = 0;
+        while let Some((t, after)) = steps.next() {
+            if after == before {
+                continue;
+            }
+            for shadowed in [before, after] {
+                let (visibility, bound) = self.levels[shadowed as usize];
+                self.is_needed |= 1.0 - visibility > bound;
+                line.visit(Node { t: t as f32, visibility: visibility as f32 }, bound as f32);
+            }
+            before = after;
+        }
+        line.end();
+        if !self.is_needed {
+            nodes.truncate(start);
+        }
     }
 
     fn begin(&mut self, bound: ErrorBound, views: u32) {
@@ -190,6 +250,10 @@ mod tests {
     use super::*;
     use crate::nodes::evaluate;
 
+    fn fewest(largest: f32) -> Compression {
+        Compression { segments: Segments::Fewest, ..largest.into() }
+    }
+
     fn exact(events: &[Event], views: u32, t: f32) -> f32 {
         let shadowed: i32 =
             events.iter().filter(|e| e.t() <= t).map(|e| if e.is_exit() { -1 } else { 1 }).sum();
@@ -218,11 +282,14 @@ mod tests {
         fn the_error_stays_within_the_bound(
             intervals in intervals(),
             max_error in prop_oneof![Just(0.0f32), 0.0f32..0.2],
+            fewest in any::<bool>(),
         ) {
             let events = events_of(&intervals);
             let views = intervals.len() as u32;
+            let segments = if fewest { Segments::Fewest } else { Segments::Greedy };
             let mut nodes = Vec::new();
-            Compressor::default().compress(&events, views, max_error.into(), &mut nodes);
+            let compression = Compression { bound: max_error.into(), segments };
+            Compressor::default().compress(&events, views, compression, &mut nodes);
             prop_assert!(nodes.windows(2).all(|pair| pair[0].t <= pair[1].t));
             // Rounding: values lie in [0, 1] and a node's is off by a few ulps of 1; a slope's product too.
             let bound = max_error + 1e-5;
@@ -246,9 +313,9 @@ mod tests {
         fn a_wider_bound_never_needs_more_than_the_steps(intervals in intervals()) {
             let events = events_of(&intervals);
             let mut all = Vec::new();
-            Compressor::default().compress(&events, intervals.len() as u32, 0.0.into(), &mut all);
+            Compressor::default().compress(&events, intervals.len() as u32, fewest(0.0), &mut all);
             let mut few = Vec::new();
-            Compressor::default().compress(&events, intervals.len() as u32, 0.1.into(), &mut few);
+            Compressor::default().compress(&events, intervals.len() as u32, fewest(0.1), &mut few);
             prop_assert!(few.len() <= all.len());
             prop_assert!(all.len() <= 2 * events.len() + 1);
         }
@@ -266,8 +333,13 @@ mod tests {
         let events: Vec<_> = (0..128).map(event).collect();
         assert!(events.is_sorted());
         let [mut nodes, mut uniform] = [Vec::new(), Vec::new()];
-        Compressor::default().compress(&events, 64, bound, &mut nodes);
-        Compressor::default().compress(&events, 64, 0.02.into(), &mut uniform);
+        Compressor::default().compress(
+            &events,
+            64,
+            Compression { bound, segments: Segments::Fewest },
+            &mut nodes,
+        );
+        Compressor::default().compress(&events, 64, fewest(0.02), &mut uniform);
         assert!(nodes.len() > uniform.len());
         for i in 0..4000 {
             let t = i as f32 / 1900.0 + 1e-4;
@@ -323,7 +395,7 @@ mod tests {
             let views = events.len() as u32;
             let bound = 2.0 / views as f32;
             let mut nodes = Vec::new();
-            Compressor::default().compress(&events, views, bound.into(), &mut nodes);
+            Compressor::default().compress(&events, views, fewest(bound), &mut nodes);
             let fixed = segments_from_fixed_starts(&events, views, f64::from(bound) - 1e-6);
             prop_assert!(nodes.len() <= fixed, "{} > {}", nodes.len(), fixed);
         }
@@ -368,14 +440,14 @@ mod tests {
         let step = |i: i32| Event::new(i as f32 / 32.0, i >= 32);
         let events: Vec<_> = (0..64).map(step).collect();
         let mut nodes = Vec::new();
-        Compressor::default().compress(&events, 32, 0.03.into(), &mut nodes);
+        Compressor::default().compress(&events, 32, fewest(0.03), &mut nodes);
         assert_eq!(nodes.len(), 3, "{nodes:?}");
     }
 
     #[test]
     fn no_event_is_no_node_and_lit() {
         let mut nodes = Vec::new();
-        Compressor::default().compress(&[], 8, 0.02.into(), &mut nodes);
+        Compressor::default().compress(&[], 8, fewest(0.02), &mut nodes);
         assert!(nodes.is_empty());
         assert_eq!(evaluate(&nodes, 0.5), 1.0);
     }
@@ -383,7 +455,7 @@ mod tests {
     #[test]
     fn a_hard_shadow_is_one_node() {
         let mut nodes = Vec::new();
-        Compressor::default().compress(&[Event::new(0.5, false)], 1, 0.02.into(), &mut nodes);
+        Compressor::default().compress(&[Event::new(0.5, false)], 1, fewest(0.02), &mut nodes);
         assert_eq!(nodes.len(), 1);
         assert_eq!([evaluate(&nodes, 0.49), evaluate(&nodes, 0.5), evaluate(&nodes, 7.0)], [1.0, 0.0, 0.0]);
     }
@@ -392,7 +464,7 @@ mod tests {
     fn many_small_steps_are_one_line() {
         let events: Vec<_> = (0..64).map(|i| Event::new(0.1 + i as f32 / 128.0, false)).collect();
         let mut nodes = Vec::new();
-        Compressor::default().compress(&events, 64, 0.02.into(), &mut nodes);
+        Compressor::default().compress(&events, 64, fewest(0.02), &mut nodes);
         assert_eq!(nodes.len(), 2, "{nodes:?}");
     }
 }

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use crate::compression::{Compressor, ErrorBound};
+use crate::compression::{Compression, Compressor};
 use crate::events::{EventStrips, SortedStrip};
 use crate::nodes::{Node, Nodes};
 use crate::surfaces::{Surface, Surfaces};
@@ -39,7 +39,7 @@ impl Functions {
         size: u32,
         parts: &[EventStrips],
         views: u32,
-        bound: ErrorBound,
+        compression: Compression,
         surfaces: Option<&Surfaces>,
     ) -> Self {
         struct Strip {
@@ -67,10 +67,10 @@ impl Functions {
                         let end = asked.partition_point(|surface| surface.pixel as usize <= pixel);
                         let (own, rest) = asked.split_at(end);
                         let own = own.iter().map(|surface| surface.range);
-                        compressor.compress_at(events, own, views, bound, &mut strip.nodes);
+                        compressor.compress_at(events, own, views, compression.bound, &mut strip.nodes);
                         asked = rest;
                     } else {
-                        compressor.compress(events, views, bound, &mut strip.nodes);
+                        compressor.compress(events, views, compression, &mut strip.nodes);
                     }
                     let count = (strip.nodes.len() - start) as u32;
                     strip.counts.push(count);

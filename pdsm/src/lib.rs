@@ -9,6 +9,7 @@ pub mod events;
 pub mod functions;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+mod greedy;
 pub mod grid;
 pub mod layout;
 pub mod maps;
@@ -105,8 +106,13 @@ impl Pdsm {
                 });
                 let functions = report.time("prepare.functions", |_| {
                     let views = layout.steps().len() as u32;
-                    let functions =
-                        Functions::new(grid.size, &events, views, self.params.bound(), surfaces.as_ref());
+                    let functions = Functions::new(
+                        grid.size,
+                        &events,
+                        views,
+                        self.params.compression(),
+                        surfaces.as_ref(),
+                    );
                     if precision == Precision::Half { functions.into_packed() } else { functions }
                 });
                 report.skip("rays without a shadow", functions.empty_pixels());

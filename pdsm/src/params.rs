@@ -3,7 +3,7 @@
 use scene_core::technique::{Params, Preset, Setting, SettingKind};
 use serde::{Deserialize, Serialize};
 
-use crate::compression::ErrorBound;
+use crate::compression::{Compression, ErrorBound, Segments};
 
 /// How numbers of the functions are kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -43,6 +43,8 @@ pub struct PdsmParams {
     /// What `max_error` is measured by: V, or a picture's values, which show errors in the dark most
     /// ([`ErrorBound`](crate::compression::ErrorBound)).
     pub error_measure: ErrorMeasure,
+    /// Which segments the functions consist of: `fewest` takes longer to build and gives shorter ones, as files should hold.
+    pub segments: Segments,
     /// Interpolate between the four nearest pixels; off reads the nearest one, and costs a quarter.
     pub bilinear: bool,
     /// Pixels from which interpolation reaches a point, along each axis: 1 is bilinear, more soften shadows further, at a
@@ -67,6 +69,7 @@ impl PdsmParams {
             pdsm_size: size,
             max_error,
             error_measure: ErrorMeasure::Visibility,
+            segments: Segments::Greedy,
             bilinear: true,
             filter_radius: 1,
             precision: Precision::Full,
@@ -78,8 +81,9 @@ impl PdsmParams {
 }
 
 impl PdsmParams {
-    pub(crate) fn bound(&self) -> ErrorBound {
-        ErrorBound { largest: self.max_error, of_display: self.error_measure == ErrorMeasure::Display }
+    pub(crate) fn compression(&self) -> Compression {
+        let of_display = self.error_measure == ErrorMeasure::Display;
+        Compression { bound: ErrorBound { largest: self.max_error, of_display }, segments: self.segments }
     }
 }
 
@@ -122,6 +126,12 @@ impl Params for PdsmParams {
             kind: SettingKind::Choice(&["visibility", "display"]),
             unit: "",
             doc: "what max_error bounds: V, or what a display shows of it",
+        },
+        Setting {
+            name: "segments",
+            kind: SettingKind::Choice(&["greedy", "fewest"]),
+            unit: "",
+            doc: "greedy is built faster; fewest is smaller and looked up faster",
         },
         Setting {
             name: "bilinear",

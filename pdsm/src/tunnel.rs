@@ -86,17 +86,17 @@ impl Chain {
     /// The extreme line of `side` that ends in `end`, to the right of all corners; `None` if it is vertical.
     #[inline]
     fn lean(&mut self, side: usize, end: Corner) -> Option<Line> {
-        let mut slope = f64::INFINITY;
-        while let Some(&corner) = self.corners.get(self.first) {
-            let next = SIGN[side] * (end.y - corner.y) / (end.t - corner.t);
-            if next >= slope {
+        let mut best = *self.corners.get(self.first)?;
+        while let Some(&next) = self.corners.get(self.first + 1) {
+            let steeper = (end.y - next.y) * (end.t - best.t) - (end.y - best.y) * (end.t - next.t);
+            if SIGN[side] * steeper >= 0.0 {
                 break;
             }
-            slope = next;
+            best = next;
             self.first += 1;
         }
-        self.first = self.first.saturating_sub(1);
-        slope.is_finite().then_some(Line { at: end, slope: SIGN[side] * slope })
+        let slope = (end.y - best.y) / (end.t - best.t);
+        slope.is_finite().then_some(Line { at: end, slope })
     }
 }
 

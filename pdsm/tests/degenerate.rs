@@ -1,6 +1,7 @@
 //! Input at the edge of what has a meaning: an answer, never a panic.
 
 use glam::{Affine3A, Vec3};
+use gnomon_pdsm::compression::Segments;
 use gnomon_pdsm::{ErrorMeasure, Factory, Pdsm, PdsmParams, Precision};
 use scene_core::geometry::ObjectFlags;
 use scene_core::technique::{ShadowQuery, TechniqueFactory};
@@ -23,6 +24,7 @@ const PARAMS: PdsmParams = PdsmParams {
     pdsm_size: 16,
     max_error: 0.01,
     error_measure: ErrorMeasure::Visibility,
+    segments: Segments::Greedy,
     bilinear: true,
     filter_radius: 1,
     precision: Precision::Full,

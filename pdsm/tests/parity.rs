@@ -7,6 +7,7 @@
 
 #![cfg(feature = "gpu")]
 
+use gnomon_pdsm::compression::Segments;
 use gnomon_pdsm::gpu::PdsmOnGpu;
 use gnomon_pdsm::{ErrorMeasure, Pdsm, PdsmParams, Precision};
 use gnomon_shadow_map::receiver_plane::{plane_tolerance, view_tolerance};
@@ -22,6 +23,7 @@ const PARAMS: PdsmParams = PdsmParams {
     pdsm_size: 128,
     max_error: 0.02,
     error_measure: ErrorMeasure::Visibility,
+    segments: Segments::Greedy,
     bilinear: true,
     filter_radius: 1,
     precision: Precision::Full,

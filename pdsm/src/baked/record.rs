@@ -5,6 +5,7 @@ use scene_core::Light;
 
 use super::words::{Reader, Writer};
 use super::{Baked, Fingerprint};
+use crate::compression::Segments;
 use crate::cpu::Window;
 use crate::functions::{Functions, Statistics};
 use crate::grid::PixelGrid;
@@ -25,6 +26,7 @@ pub(super) fn write(baked: &Baked, to: &mut Writer) {
         pdsm_size,
         max_error,
         error_measure,
+        segments,
         bilinear,
         filter_radius,
         precision,
@@ -37,7 +39,8 @@ pub(super) fn write(baked: &Baked, to: &mut Writer) {
     }
     to.f32s(&[max_error]);
     let display = error_measure == ErrorMeasure::Display;
-    for flag in [display, bilinear, precision == Precision::Half, only_surfaces, skip] {
+    let fewest = segments == Segments::Fewest;
+    for flag in [display, fewest, bilinear, precision == Precision::Half, only_surfaces, skip] {
         to.u32(u32::from(flag));
     }
     to.u64(seed);
@@ -57,7 +60,8 @@ pub(super) fn read(from: &mut Reader<'_>) -> Option<Baked> {
     let [views, map_size, pdsm_size] = [from.u32()?, from.u32()?, from.u32()?];
     let filter_radius = from.u32().filter(|radius| (1..=MOST_RADIUS).contains(radius))?;
     let [max_error] = from.finite()?;
-    let [display, bilinear, half] = [from.bool()?, from.bool()?, from.bool()?];
+    let [display, fewest, bilinear, half] = [from.bool()?, from.bool()?, from.bool()?, from.bool()?];
+    let segments = if fewest { Segments::Fewest } else { Segments::Greedy };
     let [only_surfaces, skip] = [from.bool()?, from.bool()?];
     let error_measure = if display { ErrorMeasure::Display } else { ErrorMeasure::Visibility };
     let precision = if half { Precision::Half } else { Precision::Full };
@@ -68,6 +72,7 @@ pub(super) fn read(from: &mut Reader<'_>) -> Option<Baked> {
         pdsm_size,
         max_error,
         error_measure,
+        segments,
         bilinear,
         filter_radius,
         precision,
