@@ -167,6 +167,9 @@ impl Lookup<'_> {
             return layout.share_above(receiver, normal);
         }
         let visibility = window.look_up(at.texel, before, slope, self.radius);
+        if visibility == 0.0 {
+            return visibility;
+        }
         visibility.min(layout.share_above(receiver, normal))
     }
 
