@@ -33,9 +33,9 @@ fn surfaces_alone_make_the_same_image_of_fewer_nodes() {
         assert_eq!(largest_difference(&all, &kept), 0.0, "{name}");
         assert!(fewer < nodes, "{name}: {fewer} of {nodes}");
         let wide = PdsmParams { filter_radius: 3, ..exact };
-        let (all, ..) = image(name, wide);
+        let (all_wide, ..) = image(name, wide);
         let (kept, ..) = image(name, PdsmParams { only_surfaces: true, ..wide });
-        assert_eq!(largest_difference(&all, &kept), 0.0, "{name}, wide");
+        assert_eq!(largest_difference(&all_wide, &kept), 0.0, "{name}, wide");
         let bound = 0.03;
         let (kept, _, _) = image(name, PdsmParams { only_surfaces: true, max_error: bound, ..exact });
         assert!(largest_difference(&all, &kept) <= bound + 1e-5, "{name}");
