@@ -15,11 +15,11 @@ use scene_core::{SceneSetup, VisibilityImage, io, raster, scenes};
 /// Steps a ray.
 const STEPS: usize = 64;
 /// Optical depth of the fog over the distance from the eye to what it looks at.
-const FOG: f32 = 0.8;
+const FOG: f32 = 0.55;
 /// Colour of light, of the surfaces' surroundings, and of the sky behind all.
 const LIGHT: Vec3 = Vec3::new(1.0, 0.93, 0.8);
-const AMBIENT: Vec3 = Vec3::new(0.03, 0.04, 0.06);
-const SKY: Vec3 = Vec3::new(0.02, 0.03, 0.05);
+const AMBIENT: Vec3 = Vec3::new(0.10, 0.12, 0.16);
+const SKY: Vec3 = Vec3::new(0.16, 0.19, 0.25);
 
 fn picture(setup: &SceneSetup) -> Vec<[u8; 3]> {
     let (scene, light, camera) = (&setup.scene, &setup.lights[0], &setup.camera);
@@ -60,7 +60,7 @@ fn picture(setup: &SceneSetup) -> Vec<[u8; 3]> {
                     LightPoint::Towards(direction) => direction,
                 };
                 let direct = gbuffer.normal[pixel].dot(to_light).max(0.0) * surface.values[pixel];
-                (AMBIENT + LIGHT * direct) * 0.4
+                (AMBIENT + LIGHT * direct) * 0.6
             } else {
                 SKY
             };
@@ -87,10 +87,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         scenes::build(&name, 0.0)?
     };
     (setup.camera.width, setup.camera.height) = (400, 300);
-    // From the other side, towards the light: shafts come to the eye.
-    let camera = &mut setup.camera;
-    let way = camera.eye - camera.target;
-    camera.eye = camera.target + Vec3::new(-way.x, way.y, -way.z);
     let pixels = picture(&setup);
     io::write::color_png(Path::new(&out), &pixels, 400, 300)?;
     Ok(())
