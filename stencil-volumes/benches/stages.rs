@@ -20,7 +20,7 @@ fn methods(criterion: &mut Criterion) {
         let setup = scenes::build(spec, 0.0).expect("a built-in scene");
         let (scene, light, camera) = (&setup.scene, setup.lights[0], setup.camera.with_size(512, 512));
         let gbuffer = raster::render_gbuffer(scene, &camera);
-        let casters = Casters::new(scene).expect("no masks");
+        let casters = Casters::new(scene).expect("few triangles");
         let bvh = Bvh::casters(scene);
         let mut visibility = VisibilityImage::new(512, 512);
         let mut group = criterion.benchmark_group(format!("hard-shadow/{spec}"));
@@ -45,7 +45,7 @@ fn culling(criterion: &mut Criterion) {
         let (scene, light) = (&setup.scene, setup.lights[0]);
         let camera = Camera { fov_y: 0.12, ..setup.camera.with_size(256, 256) };
         let gbuffer = raster::render_gbuffer(scene, &camera);
-        let casters = Casters::new(scene).expect("no masks");
+        let casters = Casters::new(scene).expect("few triangles");
         let mut visibility = VisibilityImage::new(256, 256);
         let mut group = criterion.benchmark_group(format!("culling/{spec}"));
         group.sample_size(10);
@@ -62,7 +62,7 @@ fn culling(criterion: &mut Criterion) {
 fn silhouettes(criterion: &mut Criterion) {
     let setup = scenes::build("chess", 0.0).expect("a built-in scene");
     let scene = &setup.scene;
-    let casters = Casters::new(scene).expect("no masks");
+    let casters = Casters::new(scene).expect("few triangles");
     let facing = facing(scene.positions(), scene.triangles(), setup.lights[0].center());
     // What a pass must read: both vertex indices of an edge, its row, and its faces with their facing.
     let edges = casters.topology.len();
@@ -80,5 +80,46 @@ fn silhouettes(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, methods, culling, silhouettes);
+/// The same pass on the GPU, by its own clock. It reads what the CPU reads, with facings of four bytes, and writes next to
+/// nothing.
+#[cfg(feature = "gpu")]
+fn silhouettes_on_gpu(criterion: &mut Criterion) {
+    use scene_core::gpu::Gpu;
+    let Ok(gpu) = Gpu::open() else { return };
+    let setup = scenes::build("chess", 0.0).expect("a built-in scene");
+    let scene = &setup.scene;
+    let topology = Casters::new(scene).expect("few triangles").topology;
+    let incidences: usize = (0..topology.len()).map(|e| topology.faces(e).len()).sum();
+    let bytes = (topology.len() * (8 + 4) + incidences * (4 + 4)) as u64;
+    let camera = setup.camera.with_size(64, 64);
+    let gbuffer = raster::render_gbuffer(scene, &camera);
+    let mut view = gpu.view(scene, &camera).expect("a small scene");
+    view.upload_gbuffer(&gbuffer).expect("the camera's size");
+    let mut technique = view.technique(&StencilVolumes::default()).expect("a GPU path");
+    let mut group = criterion.benchmark_group("silhouette on the GPU");
+    group.sample_size(10);
+    for (name, throughput) in
+        [("edges", Throughput::Elements(topology.len() as u64)), ("bytes", Throughput::Bytes(bytes))]
+    {
+        group.throughput(throughput);
+        group.bench_function(name, |b| {
+            b.iter_custom(|times| {
+                let run =
+                    |_| view.run(technique.as_mut(), &setup.lights[0], &gbuffer).expect("a frame").report;
+                let ms: f64 = (0..times)
+                    .map(run)
+                    .map(|r| r.stages_ms.get("prepare.silhouette").copied())
+                    .map(|ms| ms.unwrap_or_default())
+                    .sum();
+                std::time::Duration::from_secs_f64(ms * 1e-3)
+            });
+        });
+    }
+    group.finish();
+}
+
+#[cfg(not(feature = "gpu"))]
+fn silhouettes_on_gpu(_: &mut Criterion) {}
+
+criterion_group!(benches, methods, culling, silhouettes, silhouettes_on_gpu);
 criterion_main!(benches);

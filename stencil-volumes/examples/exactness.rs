@@ -1,102 +1,157 @@
-//! Holds shadow volumes against one exact shadow ray a pixel, on every built-in scene and every file given.
+//! Holds shadow volumes against one exact shadow ray a pixel, on every built-in scene and every file given: every way of
+//! counting, on the CPU and, with the feature `gpu`, on the GPU. A table in Markdown; ends with 1 if a pixel is wrong.
 //!
 //! ```text
-//! cargo run --release -p gnomon-stencil-volumes --example exactness -- ../shared/scenes/*.obj
+//! cargo run --release -p gnomon-stencil-volumes --example exactness -- --size 512 ../shared/scenes/*.obj
 //! ```
 
 #[path = "../tests/truth/mod.rs"]
 mod truth;
 
+use std::path::Path;
+use std::process::ExitCode;
 use std::time::Instant;
 
-use gnomon_stencil_volumes::{Casters, Count, StencilVolumes, VolumeParams};
+use gnomon_stencil_volumes::{Casters, Count, StencilVolumes, VolumeParams, near_casters};
 use scene_core::bvh::Bvh;
-use scene_core::{Light, SceneSetup, VisibilityImage, io, raster, scenes};
-use truth::{compare, trace};
+#[cfg(feature = "gpu")]
+use scene_core::gpu::Gpu;
+use scene_core::{Camera, GBuffer, Light, Scene, SceneSetup, VisibilityImage, io, raster, scenes};
+use truth::{Comparison, compare, trace};
 
-fn main() {
+fn main() -> ExitCode {
+    let mut size = 512;
     let mut setups: Vec<(String, SceneSetup)> = Vec::new();
-    let files: Vec<String> = std::env::args().skip(1).collect();
-    for file in &files {
-        if let Some(spec) = file.strip_prefix("builtin:") {
-            setups.push((spec.to_owned(), scenes::build(spec, 0.0).expect("a built-in scene")));
-            continue;
+    let built_in = |spec: &str| scenes::build(spec, 0.0).map_err(|error| error.to_string());
+    let mut arguments = std::env::args().skip(1).peekable();
+    let mut given = Vec::new();
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--size" => size = arguments.next().and_then(|text| text.parse().ok()).unwrap_or(size),
+            _ => given.push(argument),
         }
-        match io::load_setup(std::path::Path::new(file)) {
+    }
+    if given.is_empty() {
+        given = scenes::all().iter().map(|scene| format!("builtin:{}", scene.name)).collect();
+    }
+    for file in &given {
+        let setup = match file.strip_prefix("builtin:") {
+            Some(spec) => built_in(spec),
+            None => io::load_setup(Path::new(file)).map_err(|error| error.to_string()),
+        };
+        match setup {
             Ok(setup) => setups.push((file.clone(), setup)),
             Err(error) => eprintln!("{file}: {error}"),
         }
     }
-    if files.is_empty() {
-        for scene in scenes::all() {
-            match scenes::build(scene.name, 0.0) {
-                Ok(setup) => setups.push((scene.name.to_owned(), setup)),
-                Err(error) => eprintln!("{}: {error}", scene.name),
-            }
-        }
-    }
     println!(
-        "scene light count | pixels asked, differ, of these at a border, within two lifts of one | ms: rays; edges, prepare, shade | silhouette edges"
+        "| scene | light | edges | way | asked | differ | of these at a border | within two lifts | wrong | ms |"
     );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    let mut wrong = 0;
     for (name, setup) in &setups {
-        run(name, setup);
+        wrong += run(name, setup, size);
+    }
+    println!("\n{wrong} wrong");
+    ExitCode::from(u8::from(wrong > 0))
+}
+
+/// One view of a scene by one light.
+struct Case<'a> {
+    name: &'a str,
+    scene: &'a Scene,
+    camera: Camera,
+    light: Light,
+    gbuffer: &'a GBuffer,
+    bvh: &'a Bvh,
+    truth: Vec<f32>,
+    edges: usize,
+}
+
+impl Case<'_> {
+    /// Prints a row; how many pixels are wrong.
+    fn row(&self, way: &str, image: &VisibilityImage, ms: f64) -> usize {
+        let Comparison { asked, differ, at_border, at_lift, wrong } =
+            compare(self.scene, self.bvh, &self.light, &self.camera, self.gbuffer, &self.truth, image);
+        println!(
+            "| {} | {} | {} | {way} | {asked} | {differ} | {at_border} | {at_lift} | {} | {ms:.1} |",
+            self.name,
+            self.light.kind(),
+            self.edges,
+            wrong.len()
+        );
+        wrong.len()
     }
 }
 
-fn run(name: &str, setup: &SceneSetup) {
-    let (scene, camera) = (&setup.scene, setup.camera.with_size(512, 512));
-    let short = name.rsplit('/').next().unwrap_or(name);
+fn run(name: &str, setup: &SceneSetup, size: u32) -> usize {
+    let (scene, camera) = (&setup.scene, setup.camera.with_size(size, size));
+    let short = name.rsplit(['/', ':']).next().unwrap_or(name);
     let casters = match Casters::new(scene) {
         Ok(casters) => casters,
-        Err(error) => return println!("{short}: {error}"),
+        Err(error) => {
+            println!("{short}: {error}");
+            return 0;
+        }
     };
-    let start = Instant::now();
-    let _ = Casters::new(scene);
-    let edges_ms = start.elapsed().as_secs_f64() * 1e3;
     let bvh = Bvh::casters(scene);
     let gbuffer = raster::render_gbuffer(scene, &camera);
     let bounds = scene.bounds();
     let inside = bounds.center() + 0.3 * bounds.size() * glam::Vec3::new(0.5, 0.9, 0.7);
+    #[cfg(feature = "gpu")]
+    let gpu = Gpu::open().ok();
+    let mut wrong = 0;
     for light in [setup.lights[0], Light::Point { position: inside }] {
         let start = Instant::now();
         let truth = trace(scene, &bvh, &light, &gbuffer);
         let rays_ms = start.elapsed().as_secs_f64() * 1e3;
-        for count in [Count::ZPass, Count::ZFail, Count::Auto] {
+        let mut case =
+            Case { name: short, scene, camera, light, gbuffer: &gbuffer, bvh: &bvh, truth, edges: 0 };
+        let outside = near_casters(&casters, &light, &camera).is_empty();
+        let ways = [(Count::ZPass, "z-pass"), (Count::ZFail, "z-fail"), (Count::Auto, "auto")];
+        for (count, way) in ways.into_iter().filter(|(count, _)| outside || *count != Count::ZPass) {
             let technique = StencilVolumes::new(VolumeParams { count, ..Default::default() });
-            let mut best = (f64::INFINITY, f64::INFINITY);
-            let mut visibility = VisibilityImage::new(512, 512);
-            let mut edges = 0;
-            let mut stages = String::new();
-            for _ in 0..3 {
-                let start = Instant::now();
-                let (prepared, report) = technique.prepare(&casters, &light, &camera);
-                let prepare = start.elapsed().as_secs_f64() * 1e3;
-                let start = Instant::now();
-                let shade_report = prepared.shade(&gbuffer, &mut visibility);
-                let shade = start.elapsed().as_secs_f64() * 1e3;
-                if prepare + shade < best.0 + best.1 {
-                    best = (prepare, shade);
-                    stages = format!(
-                        "{:.1?} {:.1?} {:?} {:?}",
-                        report.stages_ms, shade_report.stages_ms, report.skipped, shade_report.skipped
-                    );
-                }
-                edges = prepared.volumes().map_or(0, |v| v.edges.len());
+            let mut image = VisibilityImage::new(size, size);
+            let start = Instant::now();
+            let (prepared, _) = technique.prepare(&casters, &light, &camera);
+            prepared.shade(&gbuffer, &mut image);
+            let ms = start.elapsed().as_secs_f64() * 1e3;
+            case.edges = prepared.volumes().map_or(0, |v| v.edges.len());
+            wrong += case.row(&format!("CPU {way}"), &image, ms);
+        }
+        #[cfg(feature = "gpu")]
+        if let Some(gpu) = &gpu {
+            wrong += on_gpu(gpu, &case, outside);
+        }
+        let image = VisibilityImage { values: case.truth.clone(), ..VisibilityImage::new(size, size) };
+        case.row("one ray", &image, rays_ms);
+    }
+    wrong
+}
+
+/// The same on the GPU; without a device that shades the case, nothing.
+#[cfg(feature = "gpu")]
+fn on_gpu(gpu: &Gpu, case: &Case<'_>, outside: bool) -> usize {
+    let mut wrong = 0;
+    for (count, way) in [(Count::ZPass, "z-pass"), (Count::Auto, "z-fail, auto")] {
+        if count == Count::ZPass && !outside {
+            continue;
+        }
+        let technique = StencilVolumes::new(VolumeParams { count, ..Default::default() });
+        let shaded = || -> Result<_, Box<dyn std::error::Error>> {
+            let mut view = gpu.view(case.scene, &case.camera)?;
+            view.upload_gbuffer(case.gbuffer)?;
+            let mut technique = view.technique(&technique)?;
+            Ok(view.run(technique.as_mut(), &case.light, case.gbuffer)?)
+        };
+        match shaded() {
+            Ok(run) => {
+                let ms = run.report.stages_ms.iter().filter(|(stage, _)| *stage != "prepare.edges");
+                let ms = ms.map(|(_, ms)| ms).sum();
+                wrong += case.row(&format!("GPU {way}"), &run.visibility, ms);
             }
-            let result = compare(scene, &bvh, &light, &camera, &gbuffer, &truth, &visibility);
-            println!(
-                "{short} {} {count:?} | {} {} {} {} | {rays_ms:.1}; {edges_ms:.1} {:.1} {:.1} | {edges}",
-                light.kind(),
-                result.asked,
-                result.differ,
-                result.at_border,
-                result.at_lift,
-                best.0,
-                best.1,
-            );
-            if std::env::var_os("STAGES").is_some() {
-                println!("    {stages}");
-            }
+            Err(error) => eprintln!("{}: {error}", case.name),
         }
     }
+    wrong
 }

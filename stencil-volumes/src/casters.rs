@@ -12,14 +12,17 @@ use scene_core::{Camera, Light, Report, Scene};
 
 use crate::crossing::HomogeneousLight;
 use crate::error::VolumeError;
+use crate::masked::MaskedCasters;
 
 /// Edges and bounds of a scene's casters. Independent of light and camera.
 #[derive(Clone, Debug)]
 pub struct Casters<'a> {
     /// The scene.
     pub scene: &'a Scene,
-    /// Edges of everything that casts, welded across objects.
+    /// Edges of everything that casts and has no mask, welded across objects.
     pub topology: EdgeTopology,
+    /// Where the casters with masks are.
+    pub masked: MaskedCasters,
     /// Bounds of runs of triangles.
     pub chunks: CasterChunks,
     /// Their tree, for pixels that are not counted.
@@ -30,17 +33,14 @@ impl<'a> Casters<'a> {
     /// The casters of `scene`.
     ///
     /// # Errors
-    /// A caster with a cut-out mask, or more triangles than can be numbered.
+    /// More triangles than can be numbered.
     pub fn new(scene: &'a Scene) -> Result<Self, VolumeError> {
-        let masked = |object: &&scene_core::geometry::Object| object.flags.casts && object.alpha.is_some();
-        if let Some(object) = scene.objects().iter().find(masked) {
-            return Err(VolumeError::Masked { object: object.name.clone() });
-        }
         let (topology, tree) = rayon::join(
-            || EdgeTopology::of_scene(scene, |object| object.flags.casts),
+            || EdgeTopology::of_scene(scene, |object| object.flags.casts && object.alpha.is_none()),
             || Arc::new(Bvh::casters(scene)),
         );
-        Ok(Self { scene, topology: topology?, chunks: CasterChunks::new(scene), tree })
+        let masked = MaskedCasters::new(scene);
+        Ok(Self { scene, topology: topology?, masked, chunks: CasterChunks::new(scene), tree })
     }
 
     /// Bytes held.
@@ -77,6 +77,7 @@ impl<'a> Casters<'a> {
             || (0_u32..).zip(scene.objects()).filter(|(_, o)| o.flags.casts && !o.bounds.is_empty());
         // Of large meshes only a few triangles are asked: their triangles are small.
         let mut covers: Vec<(f64, [Vec3; 3])> = casters()
+            .filter(|(_, object)| object.alpha.is_none())
             .flat_map(|(_, object)| object.triangles.clone().step_by(object.triangles.len().div_ceil(64)))
             .map(|triangle| {
                 let corners = scene.corners(triangle);

@@ -9,12 +9,4 @@ pub enum VolumeError {
     /// The edges could not be numbered.
     #[error(transparent)]
     Topology(#[from] TopologyError),
-    /// A caster has holes that its triangles do not know of.
-    #[error(
-        "caster '{object}' has a cut-out mask: the outline of its holes is in a texture, where there are no edges to make a volume of"
-    )]
-    Masked {
-        /// The object's name.
-        object: String,
-    },
 }

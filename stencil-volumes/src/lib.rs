@@ -5,23 +5,31 @@ mod casters;
 pub mod cpu;
 pub mod crossing;
 mod error;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+pub mod masked;
 pub mod outline;
 mod params;
 pub mod planar;
+pub mod receivers;
 pub mod silhouette;
 mod technique;
 pub mod volumes;
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use rayon::prelude::*;
+use scene_core::bvh::Bvh;
 use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
 
 pub use casters::{Casters, near_casters};
 use cpu::Receivers;
-use crossing::faces_between;
 pub use error::VolumeError;
+#[cfg(feature = "gpu")]
+pub use gpu::StencilVolumesOnGpu;
 pub use params::{Count, Variant, VolumeParams};
-use planar::{Receiver, planar_receivers};
+use receivers::FlatReceivers;
 pub use technique::Factory;
 use volumes::Volumes;
 
@@ -34,7 +42,7 @@ pub struct StencilVolumes {
 /// What a variant prepares.
 #[derive(Debug)]
 enum Prepared {
-    Planar(Vec<Receiver>),
+    Planar(FlatReceivers),
     Volumes(Box<Volumes>),
 }
 
@@ -45,6 +53,7 @@ pub struct PreparedVolumes<'a> {
     light: Light,
     camera: Camera,
     skip: bool,
+    tree: Arc<Bvh>,
     prepared: Prepared,
 }
 
@@ -66,7 +75,7 @@ impl StencilVolumes {
         let scene = casters.scene;
         let prepared = match variant {
             Variant::Planar => {
-                Prepared::Planar(report.time("prepare.receivers", |_| planar_receivers(scene, light)))
+                Prepared::Planar(report.time("prepare.receivers", |_| FlatReceivers::new(scene, light)))
             }
             Variant::Volumes => {
                 let volumes = Volumes::new(casters, light, camera, &self.params, &mut report);
@@ -74,7 +83,17 @@ impl StencilVolumes {
                 Prepared::Volumes(Box::new(volumes))
             }
         };
-        (PreparedVolumes { scene, light: *light, camera: *camera, skip, prepared }, report)
+        (
+            PreparedVolumes {
+                scene,
+                light: *light,
+                camera: *camera,
+                skip,
+                tree: casters.tree.clone(),
+                prepared,
+            },
+            report,
+        )
     }
 }
 
@@ -101,28 +120,24 @@ impl PreparedVolumes<'_> {
                 let work = cpu::shade(volumes, &receivers, &mut report, visibility);
                 report.skip("pixels the light cannot reach", work.unreached);
                 report.skip("tiles of one count", work.uniform);
+                report.skip("pixels no mask is before", work.free_of_masks);
             }
         }
         report
     }
 
-    /// V at free points, by counting the faces between each and the light one by one; NaN for a point that is not
-    /// finite. Takes time in proportion to points times triangles. The slices must be of equal length: what the longer
-    /// one has more is left alone.
+    /// V at free points, by one ray each; NaN for a point that is not finite. The slices must be of equal length: what the
+    /// longer one has more is left alone.
     pub fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Report {
         let mut report = Report::default();
-        let scene = self.scene;
-        let casts = |o: &&scene_core::geometry::Object| o.flags.casts;
         report.time("shade.points", |_| {
             visibility.par_iter_mut().zip(points).for_each(|(v, &point)| {
-                let triangles = scene.objects().iter().filter(casts).flat_map(|o| o.triangles.clone());
                 *v = if !point.is_finite() {
                     f32::NAN
                 } else if !self.light.reaches(point) {
                     0.0
                 } else {
-                    let faces = triangles.map(|t| scene.corners(t));
-                    f32::from(u8::from(faces_between(faces, point, self.light.center()) == 0))
+                    f32::from(u8::from(!self.tree.is_occluded(point, self.light.center())))
                 };
             });
         });

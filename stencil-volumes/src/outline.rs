@@ -9,7 +9,8 @@
 //! Let P and Q be seen points and E the eye. The ways E→P and E→Q cross no caps. So the caps that the chord P→Q
 //! crosses are those of the loop E→P→Q→E, and these are, as the chain of all caps is bounded by the silhouette, the
 //! silhouette edges that pass through the triangle E P Q: each ±m. Hence a path between two pixels is counted by
-//! silhouette edges alone, however many triangles lie along it.
+//! silhouette edges alone, however many triangles lie along it. Only on which side of an edge the ways to P and Q pass is
+//! asked of the snapped edge; the rest is asked of the vertices as they are.
 
 use glam::DVec3;
 use scene_core::Camera;
@@ -18,9 +19,15 @@ use scene_core::raster::SnappedView;
 use crate::crossing::Edge;
 
 /// In steps, how close a centre may be to an edge for its pixel to be traced instead of counted. Snapping moves a vertex
-/// by half a step along x and along y, so beyond one step the exact edge and the snapped one agree. Closer, they agree as
-/// one chain does with another, but for what happens around a vertex or on a needle thinner than a step.
-pub const CLOSE: f64 = 1.0;
+/// by half a step along x and along y, and a counted place is seen up to [`OFF_CENTER`] beside its pixel's centre: beyond two
+/// steps the exact edge and the snapped one agree. Closer, they agree as one chain does with another, but for what happens
+/// around a vertex or on a needle thinner than a step.
+pub const CLOSE: f64 = 2.0;
+
+/// In steps, how far beside its pixel's centre a place may be seen, along x and along y. A shadow ray starts off its surface and
+/// from a position that f32 has rounded: close by in a large scene, or far from the origin, that is more than a step, and
+/// the way from the eye may pass other surfaces than those that the pixel sees. Such a pixel is traced.
+pub const OFF_CENTER: f64 = 1.0;
 
 /// An edge on the screen.
 #[derive(Clone, Copy, Debug)]
@@ -81,6 +88,15 @@ impl Screen {
         self.forward.dot(from_eye)
     }
 
+    /// Whether a place is seen so far beside its pixel's centre that it cannot be counted.
+    pub fn is_off_center(&self, point: &SeenPoint) -> bool {
+        let [corner, right, down] = self.rays;
+        let depth = self.depth(point.from_eye);
+        let beside = point.from_eye - (corner + right * point.center[0] + down * point.center[1]) * depth;
+        let steps = |axis: DVec3| beside.dot(axis).abs() / (axis.length_squared() * depth);
+        !(depth > 0.0 && steps(right) <= OFF_CENTER && steps(down) <= OFF_CENTER)
+    }
+
     /// An edge on the screen. Its ends are positions of the scene, which f32 holds.
     pub fn project(&self, edge: &Edge) -> ScreenEdge {
         let depths = [edge.a, edge.b].map(|p| self.depth(p - self.eye));
@@ -116,6 +132,13 @@ impl ScreenEdge {
     #[inline(always)]
     pub fn ends(&self) -> Option<[[f64; 2]; 2]> {
         self.ends
+    }
+
+    /// Whether a centre is as close as [`CLOSE`] to the edge's line.
+    #[inline(always)]
+    pub fn is_close(&self, center: [f64; 2]) -> bool {
+        let [x, y, constant, _] = self.line;
+        (x * center[0] + y * center[1] + constant).abs() <= (x.abs() + y.abs()) * CLOSE
     }
 
     /// Whether the edge may pass before something inside a rectangle of centres that is at most `depth` deep, or as close
@@ -154,20 +177,10 @@ impl ScreenEdge {
         if from_right == self.is_right(edge, eye, to) || beyond_edge != from_right {
             return 0;
         }
-        let (a_right, b_right) = match self.ends {
-            Some([a, b]) => {
-                // The centres are moved an infinitesimal step, not the vertices: the tie is the other way round.
-                let side = |v| {
-                    let value = cross(from.center, to.center, v);
-                    value > 0.0 || (value == 0.0 && !owns(from.center, to.center))
-                };
-                (side(a), side(b))
-            }
-            None => {
-                let normal = from.from_eye.cross(to.from_eye);
-                (normal.dot(edge.a - eye) >= 0.0, normal.dot(edge.b - eye) >= 0.0)
-            }
-        };
+        // Not of the snapped vertices: which side of one the chord passes must agree with where it passes the light's ray
+        // through it, and a chord may pass as close to a vertex as it likes.
+        let right = |v: DVec3| (v - eye).cross(from.from_eye).dot(to.from_eye) >= 0.0;
+        let (a_right, b_right) = (right(edge.a), right(edge.b));
         i32::from(a_right) - i32::from(b_right)
     }
 }

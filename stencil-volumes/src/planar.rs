@@ -17,65 +17,12 @@
 
 use std::ops::Range;
 
-use glam::{Affine3A, DMat4, DVec3, DVec4, Vec3};
-use scene_core::geometry::{Object, ObjectFlags};
-use scene_core::{Camera, Light, Scene, TriangleMesh};
+use glam::{Affine3A, DMat4, DVec2, DVec3, DVec4, Vec2, Vec3};
+use scene_core::geometry::ObjectFlags;
+use scene_core::{Camera, Scene, TriangleMesh};
 
 use crate::crossing::HomogeneousLight;
-
-/// The share of the largest coordinate within which a point counts as on a plane: what a shadow ray's origin is lifted
-/// by, for the same reasons ([`scene_core::bvh::shadow_origin`]).
-const TOLERANCE: f64 = 1.0 / 2_097_152.0;
-
-/// A flat receiver: (n, d) of n·x + d = 0, n of unit length and turned to the light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Receiver {
-    /// The object.
-    pub object: u32,
-    /// Its plane.
-    pub plane: DVec4,
-    /// Height of the light; a sine for a light at infinity.
-    pub light_height: f64,
-    /// Heights up to this are on the plane.
-    pub tolerance: f64,
-}
-
-/// The flat objects that receive shadows, with the light off their plane.
-pub fn planar_receivers(scene: &Scene, light: &Light) -> Vec<Receiver> {
-    let tolerance = f64::from(scene.bounds().magnitude()) * TOLERANCE;
-    let homogeneous = HomogeneousLight::from(light.center());
-    let objects = (0_u32..).zip(scene.objects()).filter(|(_, o)| o.flags.receives);
-    objects
-        .filter_map(|(object, o)| {
-            let plane = plane_of(scene, o, tolerance)?;
-            let l = homogeneous.point.extend(if homogeneous.at_infinity { 0.0 } else { 1.0 });
-            let height = plane.dot(l);
-            let turned = if height < 0.0 { -plane } else { plane };
-            let least = if homogeneous.at_infinity { 0.0 } else { tolerance };
-            (height.abs() > least).then(|| Receiver {
-                object,
-                plane: turned,
-                light_height: height.abs(),
-                tolerance,
-            })
-        })
-        .collect()
-}
-
-/// The plane all vertices of an object lie in.
-fn plane_of(scene: &Scene, object: &Object, tolerance: f64) -> Option<DVec4> {
-    // The largest triangle has the best normal.
-    let normal_of = |t: usize| {
-        let [a, b, c] = scene.corners(t).map(Vec3::as_dvec3);
-        ((b - a).cross(c - a), a)
-    };
-    let largest = object.triangles.clone().map(normal_of);
-    let (normal, a) = largest.max_by(|x, y| x.0.length_squared().total_cmp(&y.0.length_squared()))?;
-    let normal = normal.try_normalize()?;
-    let plane = normal.extend(-normal.dot(a));
-    let flat = |p: &Vec3| plane.dot(p.as_dvec3().extend(1.0)).abs() <= tolerance;
-    scene.positions()[object.vertices.clone()].iter().all(flat).then_some(plane)
-}
+use crate::receivers::Receiver;
 
 /// T of the module's page, world to world.
 pub fn shadow_projection(plane: DVec4, light: &HomogeneousLight) -> DMat4 {
@@ -128,15 +75,14 @@ pub struct Clipped {
 }
 
 impl Clipped {
-    /// All casters but the receiver itself, which is flat and shadows no part of itself.
+    /// All casters. Of the receiver's own object that is what rises above the plane: the receiver is flat and shadows no part
+    /// of itself.
     pub fn new(scene: &Scene, receiver: &Receiver, light: &HomogeneousLight) -> Self {
         let mut clipped = Self::default();
-        let mut mesh = TriangleMesh::new("cut", Vec::new(), Vec::new());
         // A caster at the light's height has its image at infinity; what is left out is 2⁻²⁰ of the way up.
         let ceiling = receiver.light_height * (1.0 - 1.0 / 1_048_576.0);
         let height = |p: DVec3| receiver.plane.dot(p.extend(1.0));
-        let objects = (0_u32..).zip(scene.objects());
-        for (_, object) in objects.filter(|(id, o)| o.flags.casts && *id != receiver.object) {
+        for object in scene.objects().iter().filter(|o| o.flags.casts) {
             let corners = object.bounds.corners().map(|c| height(c.as_dvec3()));
             let highest = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
             if corners.into_iter().all(|h| h <= receiver.tolerance) {
@@ -146,18 +92,25 @@ impl Clipped {
                 clipped.keep(object.triangles.clone());
                 continue;
             }
+            let mut mesh = TriangleMesh::new("cut", Vec::new(), Vec::new());
+            mesh.alpha.clone_from(&object.alpha);
             for triangle in object.triangles.clone() {
+                let uv =
+                    |vertex: u32| scene.uvs().get(vertex as usize).copied().unwrap_or(Vec2::NAN).as_dvec2();
+                let uvs = scene.triangles()[triangle].map(uv);
                 let corners = scene.corners(triangle).map(Vec3::as_dvec3);
                 let below = corners.map(|c| height(c) < ceiling);
                 if below == [true; 3] {
                     clipped.keep(triangle..triangle + 1);
                 } else if below != [false; 3] {
-                    cut_below(&mut mesh, corners, |p| ceiling - height(p));
+                    cut_below(&mut mesh, corners, uvs, |p| ceiling - height(p));
                 }
             }
+            if !mesh.triangles.is_empty() {
+                // Cut points lie between corners of the scene: they are finite, and the mesh is sound.
+                let _ = clipped.cut.add(&mesh, Affine3A::IDENTITY, ObjectFlags::default());
+            }
         }
-        // Cut points lie between corners of the scene: they are finite, and the mesh is sound.
-        let _ = clipped.cut.add(&mesh, Affine3A::IDENTITY, ObjectFlags::default());
         clipped
     }
 
@@ -169,17 +122,21 @@ impl Clipped {
     }
 }
 
-/// Adds the part of a triangle where `inside` is not negative.
-fn cut_below(mesh: &mut TriangleMesh, corners: [DVec3; 3], inside: impl Fn(DVec3) -> f64) {
+/// Adds the part of a triangle where `inside` is not negative, with its texture coordinates.
+fn cut_below(mesh: &mut TriangleMesh, corners: [DVec3; 3], uvs: [DVec2; 3], inside: impl Fn(DVec3) -> f64) {
     let first = mesh.positions.len() as u32;
     for i in 0..3 {
-        let (a, b) = (corners[i], corners[(i + 1) % 3]);
-        let (da, db) = (inside(a), inside(b));
+        let j = (i + 1) % 3;
+        let (da, db) = (inside(corners[i]), inside(corners[j]));
+        let mut push = |t: f64| {
+            mesh.positions.push((corners[i] + (corners[j] - corners[i]) * t).as_vec3());
+            mesh.uvs.push((uvs[i] + (uvs[j] - uvs[i]) * t).as_vec2());
+        };
         if da >= 0.0 {
-            mesh.positions.push(a.as_vec3());
+            push(0.0);
         }
         if (da >= 0.0) != (db >= 0.0) {
-            mesh.positions.push((a + (b - a) * (da / (da - db))).as_vec3());
+            push(da / (da - db));
         }
     }
     let count = mesh.positions.len() as u32 - first;

@@ -1,13 +1,19 @@
 //! The trait's implementation, nothing else.
 
 use glam::Vec3;
+#[cfg(feature = "gpu")]
+use scene_core::Camera;
+#[cfg(feature = "gpu")]
+use scene_core::gpu::{GpuGBuffer, GpuShadowQuery, GpuShadowTechnique, Recorder};
 use scene_core::technique::{
     Capability, Description, Params, PreparedShadow, ShadowQuery, ShadowTechnique, Support, TechniqueError,
     TechniqueFromParams,
 };
 use scene_core::{GBuffer, Report, VisibilityImage};
 
-use crate::{Casters, PreparedVolumes, StencilVolumes, Variant, VolumeError, VolumeParams};
+#[cfg(feature = "gpu")]
+use crate::StencilVolumesOnGpu;
+use crate::{Casters, PreparedVolumes, StencilVolumes, Variant, VolumeParams};
 
 impl ShadowTechnique for StencilVolumes {
     fn name(&self) -> &'static str {
@@ -18,16 +24,18 @@ impl ShadowTechnique for StencilVolumes {
         const CENTRE: Support = Support::Approximate("an extended light is taken for its centre");
         let planar = self.params.variant == Variant::Planar;
         let hard =
-            if planar { Support::Approximate("only flat objects show shadows") } else { Support::Exact };
+            if planar { Support::Approximate("only flat surfaces show shadows") } else { Support::Exact };
         let support = |capability| match capability {
             Capability::DirectionalLight | Capability::PointLight | Capability::SpotLight => hard,
             Capability::Sun | Capability::SphereLight | Capability::RectLight | Capability::DiskLight => {
                 CENTRE
             }
-            Capability::AlphaMask => Support::Unsupported("the outline of a mask's holes has no edges"),
-            Capability::TriangleSoup => hard,
+            Capability::AlphaMask | Capability::TriangleSoup => hard,
             Capability::FreePoints => Support::Exact,
-            Capability::Gpu => Support::Unsupported("the CPU path is the only one so far"),
+            Capability::Gpu if !cfg!(feature = "gpu") => {
+                Support::Unsupported("built without the feature 'gpu'")
+            }
+            Capability::Gpu => Support::Exact,
         };
         Description {
             summary: SUMMARY,
@@ -48,17 +56,44 @@ impl ShadowTechnique for StencilVolumes {
     ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError> {
         let mut report = Report::default();
         let casters = report.time("prepare.edges", |_| Casters::new(query.scene));
-        let casters = casters.map_err(|error| match error {
-            VolumeError::Masked { .. } => TechniqueError::Unsupported {
-                technique: VolumeParams::TECHNIQUE,
-                input: "casters with cut-out masks".to_owned(),
-                why: error.to_string(),
-            },
-            VolumeError::Topology(_) => TechniqueError::Other(Box::new(error)),
-        })?;
+        let casters = casters.map_err(|error| TechniqueError::Other(Box::new(error)))?;
         let (prepared, rest) = StencilVolumes::prepare(self, &casters, query.light, query.camera);
         report.merge(&rest);
         Ok((Box::new(prepared), report))
+    }
+
+    #[cfg(feature = "gpu")]
+    fn gpu(
+        &self,
+        device: &wgpu::Device,
+        visibility: wgpu::TextureFormat,
+    ) -> Result<Box<dyn GpuShadowTechnique>, TechniqueError> {
+        Ok(Box::new(StencilVolumesOnGpu::new(device, self.params, visibility)))
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl GpuShadowTechnique for StencilVolumesOnGpu {
+    fn prepare(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        query: &GpuShadowQuery<'_>,
+    ) -> Result<Report, TechniqueError> {
+        StencilVolumesOnGpu::prepare(self, recorder, query)
+    }
+
+    fn shade(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        camera: &Camera,
+        gbuffer: &GpuGBuffer<'_>,
+        visibility: &wgpu::TextureView,
+    ) -> Result<Report, TechniqueError> {
+        StencilVolumesOnGpu::shade(self, recorder, camera, gbuffer, visibility)
+    }
+
+    fn survives_camera(&self) -> bool {
+        false
     }
 }
 

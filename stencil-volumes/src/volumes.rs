@@ -14,6 +14,7 @@ use crate::bounds::{LANES, SideGroup};
 use crate::casters::{Casters, near_box, near_casters};
 use crate::crossing::SideFromApex;
 use crate::crossing::{Edge, HomogeneousLight, back_cap, cap_crossing, crossing};
+use crate::masked::MaskedCasters;
 use crate::outline::{Screen, ScreenEdge};
 use crate::params::{Count, VolumeParams};
 use crate::silhouette::extract;
@@ -50,6 +51,8 @@ pub struct Volumes {
     pub near: f64,
     /// The casters' tree.
     pub tree: Arc<Bvh>,
+    /// Where casters are that are not counted.
+    pub masked: MaskedCasters,
     /// Sides a tile above which its pixels are traced.
     pub dense: u32,
 }
@@ -134,6 +137,7 @@ impl Volumes {
             screen,
             near: f64::from(camera.near),
             tree: casters.tree.clone(),
+            masked: casters.masked.clone(),
             dense: if all_dense {
                 0
             } else if rays {
@@ -303,8 +307,8 @@ fn facing_in(casters: &Casters<'_>, ranges: &[Range<usize>], light: &Light) -> V
             }
         }
     });
-    // A range may run over objects that do not cast.
-    for object in scene.objects().iter().filter(|object| !object.flags.casts) {
+    // A range may run over objects that do not cast. Those with masks are not counted.
+    for object in scene.objects().iter().filter(|object| !object.flags.casts || object.alpha.is_some()) {
         facing[object.triangles.clone()].fill(0);
     }
     facing

@@ -33,7 +33,7 @@ const CAMERA: Camera = Camera {
 
 fn shade(scene: &Scene, light: &Light, variant: Variant) -> (GBuffer, VisibilityImage) {
     let gbuffer = raster::render_gbuffer(scene, &CAMERA);
-    let casters = Casters::new(scene).expect("no masks");
+    let casters = Casters::new(scene).expect("few triangles");
     let technique = StencilVolumes::new(VolumeParams { variant, ..Default::default() });
     let (prepared, _) = technique.prepare(&casters, light, &CAMERA);
     let mut visibility = VisibilityImage::new(CAMERA.width, CAMERA.height);

@@ -12,7 +12,7 @@ use truth::{compare, trace};
 
 /// Pixels that differ away from a border may be as many as this: none. Returns those asked and in shadow.
 fn check(scene: &Scene, camera: &Camera, light: &Light, what: &str) -> (usize, usize) {
-    let casters = Casters::new(scene).expect("no masks");
+    let casters = Casters::new(scene).expect("few triangles");
     let bvh = Bvh::casters(scene);
     let gbuffer = raster::render_gbuffer(scene, camera);
     let truth = trace(scene, &bvh, light, &gbuffer);
@@ -140,11 +140,14 @@ fn scales_and_places() {
             check(&scene, &view, &light, &format!("scale {scale}"));
         }
     }
-    let offset = Vec3::new(2000.0, 0.0, -1000.0);
-    let scene = scene_of(&[&ground(6.0), &torus(40)], 1.0, offset);
-    let view = camera(Vec3::new(0.5, 3.0, 4.0) + offset, Vec3::Y * 0.3 + offset);
-    for light in lights(offset, 3.0) {
-        check(&scene, &view, &light, "far from the origin");
+    // Up to where rounding moves what is seen by more than a pixel.
+    for far in [1.0, 50.0] {
+        let offset = Vec3::new(2000.0, 300.0, -1000.0) * far;
+        let scene = scene_of(&[&ground(6.0), &torus(40)], 1.0, offset);
+        let view = camera(Vec3::new(0.5, 3.0, 4.0) + offset, Vec3::Y * 0.3 + offset);
+        for light in lights(offset, 3.0) {
+            check(&scene, &view, &light, "far from the origin");
+        }
     }
 }
 
@@ -182,9 +185,9 @@ fn eye_in_volumes_and_light_among_the_casters() {
 }
 
 proptest! {
-    // The same soups every time: of some million pixels of intersecting needles seen from within, single ones differ.
+    // The same soups every time.
     #![proptest_config(ProptestConfig {
-        cases: 200,
+        cases: 1000,
         failure_persistence: None,
         rng_seed: proptest::test_runner::RngSeed::Fixed(2),
         ..Default::default()

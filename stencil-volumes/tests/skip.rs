@@ -8,7 +8,7 @@ use scene_core::{Camera, Light, Report, Scene, TriangleMesh, VisibilityImage, ra
 /// Images with skipping on and off; the reports of the first.
 fn compare(scene: &Scene, light: &Light, camera: &Camera, variant: Variant) -> Report {
     let gbuffer = raster::render_gbuffer(scene, camera);
-    let casters = Casters::new(scene).expect("no masks");
+    let casters = Casters::new(scene).expect("few triangles");
     let mut kept = Report::default();
     let images = [true, false].map(|skip| {
         let technique = StencilVolumes::new(VolumeParams { variant, skip, ..Default::default() });

@@ -10,6 +10,7 @@ use super::tile::{PIXELS, Tile};
 use super::{Asked, BLOCK, BLOCK_TILES, Receivers, TILE, Work};
 use crate::bounds::{BoxGroup, LANES};
 use crate::crossing::{SideFromApex, crossing};
+use crate::outline::SeenPoint;
 use crate::volumes::{Start, Volumes};
 
 /// Tiles of a block.
@@ -97,6 +98,7 @@ impl Block {
         corner: [usize; 2],
         at: [usize; 2],
     ) {
+        let center = |x: usize, y: usize| SnappedView::center(x as u32, y as u32).map(f64::from);
         let gbuffer = receivers.gbuffer;
         let mut seen = Outline::NONE;
         let (width, height) = (gbuffer.width as usize, gbuffer.height as usize);
@@ -128,7 +130,14 @@ impl Block {
                             seen = Outline::new(receivers, gbuffer.triangle[pixel], volumes.screen.eye);
                         }
                         let from_eye = gbuffer.position[pixel].as_dvec3() - volumes.screen.eye;
-                        if !seen.holds(from_eye) || volumes.crosses_near_cap(from_eye) {
+                        let place = SeenPoint {
+                            center: center(x, y),
+                            from_eye: origin.as_dvec3() - volumes.screen.eye,
+                        };
+                        if !seen.holds(from_eye)
+                            || volumes.screen.is_off_center(&place)
+                            || volumes.crosses_near_cap(from_eye)
+                        {
                             let lit = !volumes.tree.is_occluded(origin, receivers.light.center());
                             self.lit[by] |= u64::from(lit) << bx;
                             self.work.traced += 1;
@@ -201,8 +210,14 @@ impl Block {
                     self.work.traced += 1;
                     // The place is an f32 that was widened.
                     !volumes.tree.is_occluded(tile.place(i).as_vec3(), light)
+                } else if starts[index] + tile.counts[i] as i32 != 0 {
+                    false
+                } else if volumes.masked.may_block(tile.place(i), light) {
+                    self.work.asked_of_masks += 1;
+                    !volumes.tree.is_occluded(tile.place(i).as_vec3(), light)
                 } else {
-                    starts[index] + tile.counts[i] as i32 == 0
+                    self.work.free_of_masks += u64::from(!volumes.masked.is_empty());
+                    true
                 };
                 let pixel = tile.pixel[i] as usize;
                 self.lit[at[1] + pixel / TILE] |= u64::from(lit) << (at[0] + pixel % TILE);

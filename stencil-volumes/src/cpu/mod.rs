@@ -6,9 +6,10 @@
 //! pixel of each, and the first tile of a block is counted from the eye or from infinity ([`crate::volumes`]). So work
 //! grows with the number of silhouette edges and the length of the shadows' outlines, not with the area of the sides.
 //!
-//! A few pixels are not counted but traced: those in tiles of very many sides, where rays cost less; those closer than
-//! 1/256 pixel to a silhouette edge; those behind a caster that the near plane cut; and those whose position lies beside
-//! the triangle it was found on. The rasteriser may take a triangle for seen up to 2⁻⁹ pixel beside
+//! Casters with cut-out masks are not counted ([`crate::masked`]). A few pixels are not counted but traced: those in tiles of very many sides, where rays cost less; those closer than
+//! 1/128 pixel to a silhouette edge; those behind a caster that the near plane cut; those whose ray starts at a place that is
+//! seen beside the pixel's centre ([`crate::outline::OFF_CENTER`]); and those whose position lies beside the triangle it was
+//! found on. The rasteriser may take a triangle for seen up to 2⁻⁹ pixel beside
 //! it; the position, on its plane, is then on no surface, perhaps behind a neighbour's, and what lies between the eye and
 //! it is not known.
 //!
@@ -47,6 +48,10 @@ pub struct Work {
     pub unreached: u64,
     /// Pixels that a ray decided.
     pub traced: u64,
+    /// Lit pixels that a ray decided because a caster with a mask may be in the way.
+    pub asked_of_masks: u64,
+    /// Lit pixels with no such caster in the way, in a scene that has some.
+    pub free_of_masks: u64,
     /// Pairs of a side and a tile that were counted pixel by pixel.
     pub pairs: u64,
 }
@@ -138,6 +143,8 @@ pub fn shade(
         work.asked += block.work.asked;
         work.unreached += block.work.unreached;
         work.traced += block.work.traced;
+        work.asked_of_masks += block.work.asked_of_masks;
+        work.free_of_masks += block.work.free_of_masks;
         work.pairs += block.work.pairs;
     }
     report.time("shade.write", |_| {

@@ -7,12 +7,13 @@ use scene_core::{Camera, Report, VisibilityImage};
 
 use super::{Asked, Receivers};
 use crate::crossing::HomogeneousLight;
-use crate::planar::{Clipped, Receiver, clip_from_caster};
+use crate::planar::{Clipped, clip_from_caster};
+use crate::receivers::FlatReceivers;
 
 /// Fills `visibility`: V where a surface is seen, NaN elsewhere. Only `flat` receivers show shadows. Those that nobody
 /// sees are left out if `skip`.
 pub fn shade(
-    flat: &[Receiver],
+    flat: &FlatReceivers,
     receivers: &Receivers<'_>,
     camera: &Camera,
     skip: bool,
@@ -34,18 +35,23 @@ pub fn shade(
             Asked::Lit | Asked::Yes => 1.0,
         };
     });
-    let mut seen = vec![false; scene.objects().len()];
-    for (object, asked) in gbuffer.object.iter().zip(&asked) {
-        if *asked == Asked::Yes {
-            seen[*object as usize] = true;
-        }
+    // The place of each asked pixel's receiver, if it has one.
+    let on: Vec<u32> = (gbuffer.triangle.iter().zip(&asked))
+        .map(|(&triangle, asked)| match asked {
+            Asked::Yes => flat.of_triangle[triangle as usize],
+            _ => FlatReceivers::NONE,
+        })
+        .collect();
+    let mut seen = vec![false; flat.receivers.len()];
+    for &index in on.iter().filter(|&&index| index != FlatReceivers::NONE) {
+        seen[index as usize] = true;
     }
     let light = HomogeneousLight::from(receivers.light.center());
     let mut scratch = RasterScratch::new();
     let mut stencil = DepthMap { width: gbuffer.width, height: gbuffer.height, depth: Vec::new() };
     let mut unseen = 0;
-    for receiver in flat {
-        if skip && !seen[receiver.object as usize] {
+    for (index, receiver) in (0_u32..).zip(&flat.receivers) {
+        if skip && !seen[index as usize] {
             unseen += 1;
             continue;
         }
@@ -58,9 +64,9 @@ pub fn shade(
             report.time("shade.stencil", |_| {
                 let options = DepthOptions { triangles, ..Default::default() };
                 render_depth_into(scene, clip, &options, &mut scratch, &mut stencil);
-                let pixels = visibility.values.par_iter_mut().zip(&stencil.depth).zip(&gbuffer.object);
-                pixels.zip(&asked).with_min_len(4096).for_each(|(((value, &depth), &object), &asked)| {
-                    if depth > 0.0 && object == receiver.object && asked == Asked::Yes {
+                let pixels = visibility.values.par_iter_mut().zip(&stencil.depth).zip(&on);
+                pixels.with_min_len(4096).for_each(|((value, &depth), &on)| {
+                    if depth > 0.0 && on == index {
                         *value = 0.0;
                     }
                 });

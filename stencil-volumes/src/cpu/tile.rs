@@ -132,13 +132,17 @@ impl Tile {
             for i in 0..self.len {
                 let to = self.seen(i, eye);
                 let beyond = towards.dot(self.place(i) - apex) >= 0.0;
+                // The rasteriser has clipped the edge and snapped what was left.
+                let close = outline.is_close([self.center[0][i], self.center[1][i]]);
+                self.close |= u64::from(close) << i;
                 self.counts[i] += f64::from(edge.multiplicity * outline.link(edge, eye, &from, &to, beyond));
             }
             return;
         };
         let from_right = outline.is_right(edge, eye, &from);
         let owned = crate::outline::owns(a, b);
-        let [fx, fy] = from.center;
+        let past = |v: DVec3| (v - eye).cross(from.from_eye);
+        let (past_a, past_b) = (past(edge.a), past(edge.b));
         for at in (0..self.len).step_by(LANES) {
             let (x, y) = (Self::load(simd, &self.center[0], at), Self::load(simd, &self.center[1], at));
             // Integers below 2⁵³: exact in any order.
@@ -162,12 +166,8 @@ impl Tile {
             ];
             let beyond = dot_from(simd, towards, place, apex).simd_ge(0.0);
             let passes = other & if from_right { beyond } else { !beyond };
-            let (dx, dy) = (x - fx, y - fy);
-            let chord_owns = dy.simd_lt(0.0) | (dy.simd_eq(0.0) & dx.simd_gt(0.0));
-            let of_a = dx * (a[1] - fy) - dy * (a[0] - fx);
-            let of_b = dx * (b[1] - fy) - dy * (b[0] - fx);
-            let a_right = of_a.simd_gt(0.0) | (of_a.simd_eq(0.0) & !chord_owns);
-            let b_right = of_b.simd_gt(0.0) | (of_b.simd_eq(0.0) & !chord_owns);
+            let a_right = dot_from(simd, past_a, place, eye).simd_ge(0.0);
+            let b_right = dot_from(simd, past_b, place, eye).simd_ge(0.0);
             self.book(simd, at, edge.multiplicity, passes & a_right & !b_right);
             self.book(simd, at, -edge.multiplicity, passes & !a_right & b_right);
         }

@@ -1,0 +1,112 @@
+//! What lives on the device as long as the scene does: edges with their faces, which triangles cast, the casters' trees.
+
+use scene_core::Scene;
+use scene_core::bvh::Bvh;
+use scene_core::geometry::EdgeTopology;
+use scene_core::gpu::{GpuError, GpuScene};
+use wgpu::util::DeviceExt as _;
+
+use super::tree::Trees;
+use crate::error::VolumeError;
+
+/// Why the tables of a scene were not made.
+#[derive(Debug, thiserror::Error)]
+pub enum TablesError {
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The scene.
+    #[error(transparent)]
+    Volumes(#[from] VolumeError),
+}
+
+/// Buffers that depend on the geometry alone.
+#[derive(Debug)]
+pub struct Tables {
+    /// The scene's buffers they were made for.
+    made_for: [wgpu::Buffer; 2],
+    /// Two vertices an edge.
+    pub vertices: wgpu::Buffer,
+    /// Where an edge's incidences start, and one more.
+    pub first: wgpu::Buffer,
+    /// Twice the face, and 1 if it runs along the edge.
+    pub incident: wgpu::Buffer,
+    /// One bit a triangle: whether it is a solid caster.
+    pub casts: wgpu::Buffer,
+    /// Nodes of the trees.
+    pub nodes: wgpu::Buffer,
+    /// Their triangles and objects.
+    pub leaves: wgpu::Buffer,
+    /// Edges.
+    pub edges: u32,
+    /// Triangles of the scene.
+    pub triangles: u32,
+    /// Nodes of solid casters.
+    pub solid_nodes: u32,
+    /// Nodes in all.
+    pub all_nodes: u32,
+}
+
+impl Tables {
+    /// Builds and uploads the tables of `scene`, whose geometry is `geometry`.
+    ///
+    /// # Errors
+    /// More triangles than can be numbered, or an array larger than the device binds in one piece.
+    pub fn new(device: &wgpu::Device, scene: &GpuScene<'_>, geometry: &Scene) -> Result<Self, TablesError> {
+        let is_solid = |o: &scene_core::geometry::Object| o.flags.casts && o.alpha.is_none();
+        let (topology, trees) = rayon::join(
+            || EdgeTopology::of_scene(geometry, is_solid),
+            || Trees::new(geometry, &Bvh::casters(geometry)),
+        );
+        let topology = topology.map_err(VolumeError::from)?;
+        let (mut first, mut incident) = (vec![0_u32], Vec::new());
+        for edge in 0..topology.len() {
+            incident.extend(topology.faces(edge).iter().map(|f| f.face() << 1 | u32::from(f.sign() > 0)));
+            first.push(incident.len() as u32);
+        }
+        let triangles = geometry.triangles().len();
+        let mut casts = vec![0_u32; triangles.div_ceil(32)];
+        for triangle in geometry.objects().iter().filter(|o| is_solid(o)).flat_map(|o| o.triangles.clone()) {
+            casts[triangle / 32] |= 1 << (triangle % 32);
+        }
+        let limits = device.limits();
+        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let buffer = |what: &'static str, bytes: &[u8]| {
+            if bytes.len() as u64 > limit {
+                return Err(GpuError::TooLarge { what, bytes: bytes.len() as u64, limit });
+            }
+            Ok(device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(what),
+                // A binding must not be empty.
+                contents: if bytes.is_empty() { &[0; 64] } else { bytes },
+                usage: wgpu::BufferUsages::STORAGE,
+            }))
+        };
+        Ok(Self {
+            made_for: [scene.positions.clone(), scene.triangles.clone()],
+            vertices: buffer("vertices of edges", bytemuck::cast_slice(topology.vertices()))?,
+            first: buffer("faces of edges", bytemuck::cast_slice(&first))?,
+            incident: buffer("faces of edges", bytemuck::cast_slice(&incident))?,
+            casts: buffer("solid casters", bytemuck::cast_slice(&casts))?,
+            nodes: buffer("nodes of the casters' tree", bytemuck::cast_slice(&trees.nodes))?,
+            leaves: buffer("leaves of the casters' tree", bytemuck::cast_slice(&trees.leaves))?,
+            edges: topology.len() as u32,
+            triangles: triangles as u32,
+            solid_nodes: trees.solid,
+            all_nodes: trees.nodes.len() as u32,
+        })
+    }
+
+    /// Whether they are those of `scene`.
+    pub fn are_of(&self, scene: &GpuScene<'_>) -> bool {
+        self.made_for[0] == *scene.positions && self.made_for[1] == *scene.triangles
+    }
+
+    /// Bytes held on the device.
+    pub fn bytes(&self) -> u64 {
+        [&self.vertices, &self.first, &self.incident, &self.casts, &self.nodes, &self.leaves]
+            .into_iter()
+            .map(wgpu::Buffer::size)
+            .sum()
+    }
+}

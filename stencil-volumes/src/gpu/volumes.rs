@@ -1,0 +1,364 @@
+//! Shadow volumes on the GPU: buffers, pipelines and the order of the passes.
+
+use bytemuck::Zeroable as _;
+use glam::Vec4;
+use scene_core::gpu::{
+    Bound, ComputePass, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder,
+    SceneBindings, SceneGroups, VisibilityPass, VisibilityPassParts, WorkBuffer, binding,
+};
+use scene_core::light::LightPoint;
+use scene_core::technique::{Params as _, TechniqueError};
+use scene_core::{Camera, Report, Scene};
+
+use super::layout::VolumesUniform;
+use super::shaders;
+use super::tables::{Tables, TablesError};
+use crate::casters::near_box;
+use crate::cpu::{BLOCK, TILE};
+use crate::{Count, VolumeParams};
+
+/// Bytes that the lists of edges of all blocks may take together. A block that has no room for its edges tells its
+/// tiles to take all there are.
+const LISTS: u64 = 64 << 20;
+
+/// Words of `counters`.
+const COUNTERS: u64 = 256;
+
+/// A compute pass with its group 0.
+#[derive(Debug)]
+struct Pass {
+    pass: ComputePass,
+    own: HeldGroup,
+}
+
+/// Which of groups 1 to 3 a pass binds.
+#[derive(Clone, Copy)]
+enum Binds {
+    Triangles,
+    TrianglesAndReceivers,
+    All,
+}
+
+/// Shadow volumes on one device: pipelines, and what the last `prepare` left.
+#[derive(Debug)]
+pub struct VolumesOnGpu {
+    params: VolumeParams,
+    tables: Option<Tables>,
+    settings: HeldBuffer,
+    facing: WorkBuffer,
+    counters: WorkBuffer,
+    edges: WorkBuffer,
+    pixels: WorkBuffer,
+    lists: WorkBuffer,
+    no_masks: HeldBuffer,
+    no_cutouts: HeldGroup,
+    scene: SceneBindings,
+    receivers: Receivers,
+    find_facing: Pass,
+    extract: Pass,
+    ask: Pass,
+    list_edges: Pass,
+    count: Pass,
+    trace: Pass,
+    write_group: HeldGroup,
+    write: VisibilityPass,
+    prepared: Option<Prepared>,
+}
+
+/// What `prepare` leaves to `shade`.
+#[derive(Debug)]
+struct Prepared {
+    uniform: VolumesUniform,
+    scene: SceneGroups,
+    cutouts: wgpu::BindGroup,
+}
+
+impl VolumesOnGpu {
+    /// Makes the pipelines. `visibility` is the format of the texture that V is written to.
+    pub fn new(device: &wgpu::Device, params: VolumeParams, visibility: wgpu::TextureFormat) -> Self {
+        const READ: wgpu::BindingType = binding::STORAGE;
+        const WRITE: wgpu::BindingType = binding::STORAGE_WRITE;
+        let stages = wgpu::ShaderStages::FRAGMENT | wgpu::ShaderStages::COMPUTE;
+        let scene = SceneBindings::new(device, stages);
+        let receivers = Receivers::new(device);
+        let pass = |label, wgsl, entry, binds, types: &[wgpu::BindingType]| {
+            let types = [&[binding::UNIFORM], types].concat();
+            let own = HeldGroup::new(device, label, stages, &types);
+            let (triangles, cutouts) = (Some(&scene.triangles_layout), Some(&scene.cutouts_layout));
+            let groups = match binds {
+                Binds::Triangles => vec![Some(own.layout()), triangles],
+                Binds::TrianglesAndReceivers => {
+                    vec![Some(own.layout()), triangles, None, Some(receivers.layout())]
+                }
+                Binds::All => vec![Some(own.layout()), triangles, cutouts, Some(receivers.layout())],
+            };
+            Pass { pass: ComputePass::new(device, label, wgsl, entry, &groups), own }
+        };
+        let lit = Binds::TrianglesAndReceivers;
+        let find_facing =
+            pass("volumes facing", shaders::FACING, "find_facing", Binds::Triangles, &[READ, WRITE, WRITE]);
+        let extract = pass(
+            "volumes silhouette",
+            shaders::SILHOUETTE,
+            "extract_silhouette",
+            Binds::Triangles,
+            &[READ, READ, READ, READ, WRITE, WRITE],
+        );
+        let ask = pass("volumes ask", shaders::ASK, "ask", lit, &[READ, READ, READ, WRITE]);
+        let list_edges =
+            pass("volumes blocks", shaders::BLOCKS, "list_edges", lit, &[READ, READ, READ, WRITE]);
+        let count = pass("volumes tiles", shaders::TILES, "count", lit, &[READ, READ, WRITE, READ]);
+        let trace = pass("volumes rays", shaders::RAYS, "trace", Binds::All, &[READ, READ, WRITE]);
+        let write_group = HeldGroup::new(device, "volumes write", stages, &[binding::UNIFORM, READ]);
+        let write = VisibilityPass::new(
+            device,
+            &VisibilityPassParts {
+                label: "volumes write",
+                wgsl: shaders::WRITE,
+                fragment: "write",
+                own: write_group.layout(),
+                scene: &scene,
+                receivers: &receivers,
+                format: visibility,
+            },
+        );
+        Self {
+            params,
+            tables: None,
+            settings: HeldBuffer::uniform("volumes"),
+            facing: WorkBuffer::new("facings"),
+            counters: WorkBuffer::new("counters"),
+            edges: WorkBuffer::new("edges of the silhouette"),
+            pixels: WorkBuffer::new("states of pixels"),
+            lists: WorkBuffer::new("edges of blocks"),
+            no_masks: HeldBuffer::storage("no masks"),
+            no_cutouts: HeldGroup::new(device, "no cut-outs", stages, &[READ, READ]),
+            scene,
+            receivers,
+            find_facing,
+            extract,
+            ask,
+            list_edges,
+            count,
+            trace,
+            write_group,
+            write,
+            prepared: None,
+        }
+    }
+
+    /// `prepare.facing` and `prepare.silhouette`.
+    pub(super) fn prepare(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        query: &GpuShadowQuery<'_>,
+        geometry: &Scene,
+    ) -> Result<Report, TechniqueError> {
+        let mut report = Report::default();
+        let device = recorder.device;
+        self.prepared = None;
+        let kept = self.tables.take().filter(|tables| tables.are_of(&query.scene));
+        let tables = match kept {
+            Some(tables) => tables,
+            None => report.time("prepare.edges", |_| Tables::new(device, &query.scene, geometry)).map_err(
+                |error| match error {
+                    TablesError::Gpu(error) => TechniqueError::from(error),
+                    TablesError::Volumes(error) => TechniqueError::Other(Box::new(error)),
+                },
+            )?,
+        };
+        let uniform = self.uniform(&tables, query, device);
+        let settings = self.settings.get(device, bytemuck::bytes_of(&uniform));
+        let facing = self.facing.get(device, 4 * u64::from(tables.triangles))?;
+        let counters = self.counters.get(device, 4 * COUNTERS)?;
+        let edges = self.edges.get(device, 16 * u64::from(tables.edges))?;
+        recorder.encoder.clear_buffer(&counters, 0, None);
+        let scene = self.scene.groups(device, &query.scene);
+        let triangles = Some(&scene.triangles);
+
+        let own = [
+            settings.clone().into(),
+            tables.casts.clone().into(),
+            facing.clone().into(),
+            counters.clone().into(),
+        ];
+        let own = self.find_facing.own.get(device, &own);
+        let groups = [Some(&own), triangles];
+        self.find_facing.pass.record(recorder, "prepare.facing", &groups, workgroups(tables.triangles));
+
+        let own = [
+            settings.into(),
+            tables.vertices.clone().into(),
+            tables.first.clone().into(),
+            tables.incident.clone().into(),
+            facing.into(),
+            counters.into(),
+            edges.into(),
+        ];
+        let own = self.extract.own.get(device, &own);
+        let groups = [Some(&own), triangles];
+        self.extract.pass.record(recorder, "prepare.silhouette", &groups, workgroups(tables.edges));
+
+        let cutouts = scene.cutouts.clone().unwrap_or_else(|| {
+            let none: Bound = self.no_masks.get(device, &[]).into();
+            self.no_cutouts.get(device, &[none.clone(), none])
+        });
+        self.receivers.prepare(device, query);
+        self.tables = Some(tables);
+        self.prepared = Some(Prepared { uniform, scene, cutouts });
+        report.bytes = self.bytes();
+        Ok(report)
+    }
+
+    fn uniform(&self, tables: &Tables, query: &GpuShadowQuery<'_>, device: &wgpu::Device) -> VolumesUniform {
+        let camera = query.camera;
+        let near = near_box(camera);
+        let light_point = match query.light.center() {
+            LightPoint::At(place) => place.extend(1.0),
+            LightPoint::Towards(direction) => direction.extend(0.0),
+        };
+        let limits = device.limits();
+        let limit = LISTS.min(limits.max_storage_buffer_binding_size).min(limits.max_buffer_size);
+        let [columns, rows] = tiles(camera, BLOCK);
+        let room = limit / (4 * u64::from(columns) * u64::from(rows)).max(1);
+        let magnitude = query.scene.bounds.magnitude();
+        VolumesUniform {
+            eye: camera.eye,
+            near: camera.near,
+            light_point: if light_point.is_finite() { light_point } else { Vec4::ZERO },
+            near_low: near.min,
+            magnitude: if magnitude.is_finite() { magnitude } else { 0.0 },
+            near_high: near.max,
+            eye_counts: u32::from(self.params.count != Count::ZPass),
+            size: [camera.width, camera.height],
+            triangles: tables.triangles,
+            edges: tables.edges,
+            capacity: u64::from(tables.edges).min(room.saturating_sub(2)) as u32,
+            solid_nodes: tables.solid_nodes,
+            nodes: tables.all_nodes,
+            ..VolumesUniform::zeroed()
+        }
+    }
+
+    /// `shade.ask` to `shade.write`.
+    pub(super) fn shade(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        camera: &Camera,
+        gbuffer: &GpuGBuffer<'_>,
+        visibility: &wgpu::TextureView,
+    ) -> Result<Report, TechniqueError> {
+        let device = recorder.device;
+        let not_prepared = || TechniqueError::NotPrepared { technique: VolumeParams::TECHNIQUE };
+        let prepared = self.prepared.as_ref().ok_or_else(not_prepared)?;
+        let tables = self.tables.as_ref().ok_or_else(not_prepared)?;
+        let (uniform, scene) = (&prepared.uniform, &prepared.scene);
+        if gbuffer.size != uniform.size || [camera.width, camera.height] != uniform.size {
+            let area = |[width, height]: [u32; 2]| width as usize * height as usize;
+            return Err(TechniqueError::OutputSize { expected: area(uniform.size), got: area(gbuffer.size) });
+        }
+        let receivers = self.receivers.group(device, camera, gbuffer).ok_or_else(not_prepared)?;
+        let count = u64::from(uniform.size[0]) * u64::from(uniform.size[1]);
+        let [columns, rows] = tiles(camera, BLOCK);
+        let blocks = u64::from(columns) * u64::from(rows);
+        let settings: Bound = self.settings.get(device, bytemuck::bytes_of(uniform)).into();
+        let pixels: Bound = self.pixels.get(device, 4 * (4 + 2 * count))?.into();
+        let lists: Bound = self.lists.get(device, 4 * blocks * (u64::from(uniform.capacity) + 2))?.into();
+        let counters: Bound = self.counters.get(device, 4 * COUNTERS)?.into();
+        let edges: Bound = self.edges.get(device, 16 * u64::from(tables.edges))?.into();
+        let nodes: Bound = tables.nodes.clone().into();
+        let leaves: Bound = tables.leaves.clone().into();
+
+        let [tile_columns, tile_rows] = tiles(camera, TILE);
+        let (triangles, receivers) = (Some(&scene.triangles), Some(&receivers));
+        let own = [settings.clone(), nodes.clone(), leaves.clone(), counters.clone(), pixels.clone()];
+        let own = self.ask.own.get(device, &own);
+        let groups = [Some(&own), triangles, None, receivers];
+        self.ask.pass.record(recorder, "shade.ask", &groups, [tile_columns, tile_rows, 1]);
+
+        let own = [settings.clone(), edges.clone(), counters.clone(), pixels.clone(), lists.clone()];
+        let own = self.list_edges.own.get(device, &own);
+        let groups = [Some(&own), triangles, None, receivers];
+        self.list_edges.pass.record(recorder, "shade.blocks", &groups, [columns, rows, 1]);
+
+        let own = [settings.clone(), edges, counters, pixels.clone(), lists];
+        let own = self.count.own.get(device, &own);
+        let groups = [Some(&own), triangles, None, receivers];
+        self.count.pass.record(recorder, "shade.tiles", &groups, [tile_columns, tile_rows, 1]);
+
+        let own = [settings.clone(), nodes, leaves, pixels.clone()];
+        let own = self.trace.own.get(device, &own);
+        let groups = [Some(&own), triangles, Some(&prepared.cutouts), receivers];
+        // As many threads as there are pixels, up to what keeps a large GPU busy; each takes every so-manieth of the list.
+        let threads = (count.div_ceil(64) as u32).min(1024);
+        self.trace.pass.record(recorder, "shade.rays", &groups, [threads, 1, 1]);
+
+        let own = self.write_group.get(device, &[settings, pixels]);
+        if let Some(receivers) = receivers {
+            self.write.record(recorder, "shade.write", &own, scene, receivers, visibility);
+        }
+        Ok(Report { bytes: self.bytes(), ..Default::default() })
+    }
+
+    fn bytes(&self) -> u64 {
+        let work = [&self.facing, &self.counters, &self.edges, &self.pixels, &self.lists];
+        work.into_iter().map(WorkBuffer::bytes).sum::<u64>() + self.tables.as_ref().map_or(0, Tables::bytes)
+    }
+
+    /// The buffer of counters of the last frame: edges found, faces between eye and light, faces before the near plane.
+    /// For tests and benchmarks.
+    ///
+    /// # Errors
+    /// If the device has no room for it.
+    pub fn counters(&mut self, device: &wgpu::Device) -> Result<wgpu::Buffer, TechniqueError> {
+        Ok(self.counters.get(device, 4 * COUNTERS)?)
+    }
+
+    /// The buffer of pixels of the last frame: word 0 says how many of them a ray decided. For tests and benchmarks.
+    ///
+    /// # Errors
+    /// If the device has no room for it.
+    pub fn pixels(&mut self, device: &wgpu::Device) -> Result<wgpu::Buffer, TechniqueError> {
+        Ok(self.pixels.get(device, 16)?)
+    }
+}
+
+/// Workgroups of 64 for so many elements, in two dimensions.
+fn workgroups(elements: u32) -> [u32; 3] {
+    /// What every device takes in one dimension.
+    const MOST: u32 = 32_768;
+    let groups = elements.div_ceil(64);
+    [groups.min(MOST), groups.div_ceil(MOST), 1]
+}
+
+/// Squares of `side` pixels that cover the image, columns and rows.
+fn tiles(camera: &Camera, side: usize) -> [u32; 2] {
+    [camera.width, camera.height].map(|pixels| pixels.div_ceil(side as u32))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn workgroups_reach_every_element() {
+        for elements in [0, 1, 64, 65, 32_768 * 64, 32_768 * 64 + 1, 20_000_000] {
+            let [x, y, _] = workgroups(elements);
+            assert!(u64::from(x) * u64::from(y) * 64 >= u64::from(elements) && x <= 65_535 && y <= 65_535);
+        }
+        assert_eq!(workgroups(0)[0], 0);
+        let camera = Camera {
+            eye: Vec3::ZERO,
+            target: Vec3::Z,
+            up: Vec3::Y,
+            fov_y: 1.0,
+            near: 0.1,
+            far: 1.0,
+            width: 65,
+            height: 64,
+        };
+        assert_eq!(tiles(&camera, BLOCK), [2, 1]);
+    }
+}

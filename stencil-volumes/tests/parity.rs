@@ -1,0 +1,151 @@
+//! The GPU path against one exact shadow ray a pixel, and against the CPU path.
+//!
+//! V may differ only where the position, which the G-buffer's texture keeps as a distance in f32, is rounded to the other
+//! side of an outline: such a pixel lies within 1e-3 pixel of a true shadow's border, or within two lifts of a ray's origin of
+//! one, and is counted.
+
+#![cfg(feature = "gpu")]
+
+mod truth;
+
+use glam::Vec3;
+use gnomon_stencil_volumes::near_casters;
+use gnomon_stencil_volumes::{Casters, Count, StencilVolumes, StencilVolumesOnGpu, Variant, VolumeParams};
+use scene_core::bvh::Bvh;
+use scene_core::gpu::headless::VISIBILITY_FORMAT;
+use scene_core::gpu::{Gpu, testing};
+use scene_core::reference::valid_pixels;
+use scene_core::{Camera, GBuffer, Light, Scene, VisibilityImage, raster, scenes};
+use truth::{Comparison, compare, trace};
+
+fn on_gpu(
+    gpu: &Gpu,
+    scene: &Scene,
+    camera: &Camera,
+    light: &Light,
+    gbuffer: &GBuffer,
+    params: VolumeParams,
+) -> (VisibilityImage, [u32; 4]) {
+    let mut view = gpu.view(scene, camera).unwrap();
+    view.upload_gbuffer(gbuffer).unwrap();
+    let mut on_gpu = StencilVolumesOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT);
+    let run = view.run(&mut on_gpu, light, gbuffer).unwrap();
+    let StencilVolumesOnGpu::Volumes(volumes) = &mut on_gpu else { return (run.visibility, [0; 4]) };
+    let counters: Vec<u32> = gpu.read_buffer(&volumes.counters(&gpu.device).unwrap()).unwrap();
+    let pixels: Vec<u32> = gpu.read_buffer(&volumes.pixels(&gpu.device).unwrap()).unwrap();
+    (run.visibility, [counters[0], counters[1], counters[2], pixels[0]])
+}
+
+fn check(gpu: &Gpu, name: &str, scene: &Scene, camera: &Camera, light: &Light) -> Comparison {
+    let gbuffer = raster::render_gbuffer(scene, camera);
+    let bvh = Bvh::casters(scene);
+    let truth = trace(scene, &bvh, light, &gbuffer);
+    let outside = near_casters(&Casters::new(scene).unwrap(), light, camera).is_empty();
+    let mut last = Comparison::default();
+    for count in [Count::Auto, Count::ZPass] {
+        if count == Count::ZPass && !outside {
+            continue;
+        }
+        let params = VolumeParams { count, ..Default::default() };
+        let (image, [edges, eye, near, rays]) = on_gpu(gpu, scene, camera, light, &gbuffer, params);
+        last = compare(scene, &bvh, light, camera, &gbuffer, &truth, &image);
+        println!(
+            "{name} {} {count:?}: {} differ of {}, {} at a border, {} within two lifts, {} wrong; {edges} edges, {eye} faces before the eye, {near} near, {rays} pixels traced",
+            light.kind(),
+            last.differ,
+            last.asked,
+            last.at_border,
+            last.at_lift,
+            last.wrong.len()
+        );
+        assert!(last.wrong.is_empty(), "{name}, {light:?}, {count:?}: pixel {:?}", last.wrong.first());
+        // A light in a surface's plane leaves that to rounding: valid pixels alone are held to the design's bound.
+        let valid = valid_pixels(&gbuffer, light);
+        let asked = valid.iter().filter(|&&valid| valid).count();
+        let differ = (0..truth.len()).filter(|&p| valid[p] && image.values[p] != truth[p]).count();
+        assert!(differ * 1000 <= asked, "{name}, {light:?}: {differ} of {asked} valid pixels differ");
+    }
+    last
+}
+
+#[test]
+fn every_built_in_scene() {
+    let Some(gpu) = testing::gpu() else { return };
+    for scene in scenes::all() {
+        let setup = scenes::build(scene.name, 0.4).unwrap();
+        let camera = setup.camera.with_size(160, 120);
+        let bounds = setup.scene.bounds();
+        let inside = Light::Point { position: bounds.center() + 0.1 * bounds.size() };
+        for light in [setup.lights[0], inside] {
+            check(&gpu, scene.name, &setup.scene, &camera, &light);
+        }
+    }
+}
+
+/// The eye in a shadow, the near plane through casters, the light on a vertex and in a face's plane.
+#[test]
+fn views_that_are_hard() {
+    let Some(gpu) = testing::gpu() else { return };
+    let setup = scenes::build("knot", 0.0).unwrap();
+    let scene = &setup.scene;
+    let bounds = scene.bounds();
+    let (center, size) = (bounds.center(), bounds.size().max_element());
+    let first = scene.positions()[0];
+    for eye in [center + Vec3::new(0.02, -0.05, 0.03) * size, setup.camera.eye] {
+        for near in [setup.camera.near, 0.3 * (setup.camera.eye - center).length()] {
+            let camera = Camera { eye, near, ..setup.camera.with_size(96, 72) };
+            for light in [
+                setup.lights[0],
+                Light::Point { position: center },
+                Light::Point { position: first },
+                Light::Directional { direction: Vec3::new(0.2, -1.0, 0.1), angular_radius: 0.0 },
+            ] {
+                check(&gpu, "knot", scene, &camera, &light);
+            }
+        }
+    }
+}
+
+/// The comparison can fail: the shadows of another light differ, and no border explains it.
+#[test]
+fn a_planted_difference_is_found() {
+    let Some(gpu) = testing::gpu() else { return };
+    let setup = scenes::build("ball", 0.0).unwrap();
+    let camera = setup.camera.with_size(64, 48);
+    let light = Light::Point { position: Vec3::new(2.0, 6.0, 1.0) };
+    let other = Light::Point { position: Vec3::new(-2.0, 6.0, 1.0) };
+    let gbuffer = raster::render_gbuffer(&setup.scene, &camera);
+    let bvh = Bvh::casters(&setup.scene);
+    let truth = trace(&setup.scene, &bvh, &light, &gbuffer);
+    let (image, _) = on_gpu(&gpu, &setup.scene, &camera, &other, &gbuffer, VolumeParams::default());
+    let found = compare(&setup.scene, &bvh, &light, &camera, &gbuffer, &truth, &image).wrong.len();
+    assert!(found > 50, "{found}");
+}
+
+/// Planar shadows: outlines are snapped to 1/256 pixel by both rasterisers, so a few pixels on them may differ.
+#[test]
+fn planar_receivers() {
+    let Some(gpu) = testing::gpu() else { return };
+    let params = VolumeParams { variant: Variant::Planar, ..Default::default() };
+    for name in ["ball", "chess", "cornell", "log-cabin", "fence"] {
+        let setup = scenes::build(name, 0.0).unwrap();
+        let (scene, camera) = (&setup.scene, setup.camera.with_size(160, 120));
+        let gbuffer = raster::render_gbuffer(scene, &camera);
+        let bounds = scene.bounds();
+        for light in [setup.lights[0], Light::Point { position: bounds.center() + 0.3 * bounds.size() }] {
+            let casters = Casters::new(scene).unwrap();
+            let mut expected = VisibilityImage::new(camera.width, camera.height);
+            StencilVolumes::new(params).prepare(&casters, &light, &camera).0.shade(&gbuffer, &mut expected);
+            let (image, _) = on_gpu(&gpu, scene, &camera, &light, &gbuffer, params);
+            let asked = (0..gbuffer.pixel_count()).filter(|&p| gbuffer.is_seen(p)).count();
+            let differ =
+                image.values.iter().zip(&expected.values).filter(|(a, b)| !a.is_nan() && a != b).count();
+            let dark = expected.values.iter().filter(|&&v| v == 0.0).count();
+            println!("planar {name} {}: {differ} of {asked} differ, {dark} dark", light.kind());
+            assert!(
+                differ * 1000 <= asked && dark > 0,
+                "{name}, {light:?}: {differ} of {asked} differ, {dark} dark"
+            );
+        }
+    }
+}
