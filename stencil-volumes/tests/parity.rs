@@ -106,6 +106,31 @@ fn views_that_are_hard() {
     }
 }
 
+/// Blocks without room for their edges take all there are; one value serves any number of frames.
+#[test]
+fn lists_without_room_change_no_pixel() {
+    let Some(gpu) = testing::gpu() else { return };
+    let setup = scenes::build("chess", 0.0).unwrap();
+    let camera = setup.camera.with_size(96, 72);
+    let gbuffer = raster::render_gbuffer(&setup.scene, &camera);
+    let mut view = gpu.view(&setup.scene, &camera).unwrap();
+    view.upload_gbuffer(&gbuffer).unwrap();
+    let mut on_gpu = StencilVolumesOnGpu::new(&gpu.device, VolumeParams::default(), VISIBILITY_FORMAT);
+    let mut images = Vec::new();
+    for (bytes, light) in [
+        (64 << 20, setup.lights[0]),
+        (1 << 10, setup.lights[0]),
+        (0, Light::Point { position: setup.scene.bounds().center() }),
+        (64 << 20, Light::Point { position: setup.scene.bounds().center() }),
+    ] {
+        let StencilVolumesOnGpu::Volumes(volumes) = &mut on_gpu else { unreachable!("the default variant") };
+        volumes.set_list_bytes(bytes);
+        let run = view.run(&mut on_gpu, &light, &gbuffer).unwrap();
+        images.push(run.visibility.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+    }
+    assert!(images[0] == images[1] && images[2] == images[3] && images[0] != images[2]);
+}
+
 /// The comparison can fail: the shadows of another light differ, and no border explains it.
 #[test]
 fn a_planted_difference_is_found() {

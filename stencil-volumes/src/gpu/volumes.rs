@@ -43,6 +43,7 @@ enum Binds {
 #[derive(Debug)]
 pub struct VolumesOnGpu {
     params: VolumeParams,
+    list_bytes: u64,
     tables: Option<Tables>,
     settings: HeldBuffer,
     facing: WorkBuffer,
@@ -124,6 +125,7 @@ impl VolumesOnGpu {
         );
         Self {
             params,
+            list_bytes: LISTS,
             tables: None,
             settings: HeldBuffer::uniform("volumes"),
             facing: WorkBuffer::new("facings"),
@@ -218,7 +220,7 @@ impl VolumesOnGpu {
             LightPoint::Towards(direction) => direction.extend(0.0),
         };
         let limits = device.limits();
-        let limit = LISTS.min(limits.max_storage_buffer_binding_size).min(limits.max_buffer_size);
+        let limit = self.list_bytes.min(limits.max_storage_buffer_binding_size).min(limits.max_buffer_size);
         let [columns, rows] = tiles(camera, BLOCK);
         let room = limit / (4 * u64::from(columns) * u64::from(rows)).max(1);
         let magnitude = query.scene.bounds.magnitude();
@@ -303,6 +305,11 @@ impl VolumesOnGpu {
     fn bytes(&self) -> u64 {
         let work = [&self.facing, &self.counters, &self.edges, &self.pixels, &self.lists];
         work.into_iter().map(WorkBuffer::bytes).sum::<u64>() + self.tables.as_ref().map_or(0, Tables::bytes)
+    }
+
+    /// Bytes that the lists of edges of all blocks may take together, 64 MiB if nothing is said. Less costs time, no pixel.
+    pub fn set_list_bytes(&mut self, bytes: u64) {
+        self.list_bytes = bytes;
     }
 
     /// The buffer of counters of the last frame: edges found, faces between eye and light, faces before the near plane.
