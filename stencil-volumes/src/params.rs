@@ -23,10 +23,10 @@ pub enum Count {
     /// From the eye, which is taken to be in no volume and to have no caster before its near plane. Wrong where one
     /// of both does not hold. Needs no caps.
     ZPass,
-    /// From infinity. Always right; pays for the caps of all casters.
+    /// From infinity. Always right; pays for the caps of all casters. On the GPU the same as [`Count::Auto`].
     ZFail,
     /// Each caster as it needs it: from the eye if no part of it lies in the pyramid of light and near rectangle,
-    /// else from infinity. Always right.
+    /// else from infinity. Always right. On the GPU all are counted from the eye, whose own count is taken first.
     #[default]
     Auto,
 }
@@ -40,9 +40,10 @@ pub struct VolumeParams {
     /// From where faces are counted; of no meaning for `planar`.
     pub count: Count,
     /// Trace a shadow ray for each pixel of a tile where more than [`crate::volumes::DENSE`] sides would have to be
-    /// counted, which costs more; no pixel changes. Off only to measure.
+    /// counted, which costs more; no pixel changes. Off only to measure. On the CPU alone.
     pub rays: bool,
-    /// Leave out what cannot change the image: casters outside the region that matters or in another's shadow.
+    /// Leave out what cannot change the image: casters outside the region that matters or in another's shadow. On the CPU
+    /// alone: on the GPU the blocks of the image leave out what does not reach them, and nothing else is asked.
     pub skip: bool,
 }
 
