@@ -1,11 +1,17 @@
 //! The command line: what can be asked, and its help.
 
+mod audit;
+mod recommend;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::bench::shard::Shard;
 use crate::bench::station::Axis;
+
+pub(crate) use audit::AuditArgs;
+pub(crate) use recommend::RecommendArgs;
 
 /// Real-time shadow techniques, measured against ray-traced ground truth.
 ///
@@ -25,6 +31,7 @@ Examples:
   gnomon reference cornell --samples 1024 --out out/truth
   gnomon bake park -o park.pdsm        soft shadows of what stands still, in a file
   gnomon bench ball quads              run time against error, in out/bench/index.html
+  gnomon recommend dragon.obj --max-error 0.05
   gnomon techniques shadow-map         its settings, their units, ranges and defaults
   gnomon scenes                        built-in scenes and their parameters
 
@@ -70,6 +77,10 @@ pub(crate) enum Command {
     Bench(BenchArgs),
     /// Every technique on scenes that are hard on numbers; exit code 1 if one fails
     Stress(StressArgs),
+    /// The technique, variant and preset for a scene and an error or a time not to exceed
+    Recommend(RecommendArgs),
+    /// What skipping saves, technique by scene, and that it changes no image; exit code 1 if it does
+    Audit(AuditArgs),
     /// Techniques with their settings, units, ranges, defaults and presets
     Techniques(TechniquesArgs),
     /// Built-in scenes and their parameters

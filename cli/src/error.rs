@@ -95,6 +95,14 @@ pub(crate) enum CliError {
         #[source]
         source: serde_json::Error,
     },
+    #[error("{} holds no measurements of this version: it should be the recommend.csv of a `gnomon bench`", path.display())]
+    Measurements {
+        path: PathBuf,
+        #[source]
+        source: csv::Error,
+    },
+    #[error("no technique takes this scene and is in the measurements; `gnomon compare` tries all")]
+    NothingToRecommend,
     #[error("{0}")]
     CheckFailed(String),
     #[error("a trial cannot be built: {0}")]

@@ -15,6 +15,7 @@ mod ground_truth;
 mod measure;
 mod output;
 mod picture;
+mod recommend;
 mod report;
 mod scene_source;
 mod stress;
@@ -45,10 +46,10 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), CliError> {
     if let Some(threads) = arguments.global.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(threads))
-            .build_global()
-            .map_err(|error| CliError::Threads(error.to_string()))?;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads));
+        // One thread is this one, so that a profiler finds all work below its caller.
+        let pool = if threads == 1 { pool.use_current_thread() } else { pool };
+        pool.build_global().map_err(|error| CliError::Threads(error.to_string()))?;
     }
     let console = Console::new(arguments.global.json);
     match &arguments.command {
@@ -57,6 +58,8 @@ fn run(arguments: &Arguments) -> Result<(), CliError> {
         Command::Bake(arguments) => commands::bake::run(arguments, &console),
         Command::Reference(arguments) => commands::reference::run(arguments, &console),
         Command::Bench(arguments) => commands::bench::run(arguments, &console),
+        Command::Recommend(arguments) => commands::recommend::run(arguments, &console),
+        Command::Audit(arguments) => commands::audit::run(arguments, &console),
         Command::Stress(arguments) => commands::stress::run(arguments, &console),
         Command::Techniques(arguments) => commands::techniques::run(arguments, &console),
         Command::Scenes => commands::scenes::run(&console),

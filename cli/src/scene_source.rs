@@ -29,7 +29,7 @@ pub(crate) enum SceneSourceError {
 }
 
 /// A scene with the camera and the light that a command looks at.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct View {
     pub(crate) setup: SceneSetup,
     pub(crate) light_index: usize,

@@ -2,7 +2,7 @@
 
 use crate::shell::{CheckError, cargo};
 use crate::snapshots::Report;
-use crate::{docs, gallery, package, shaders, tidy, vulkan};
+use crate::{docs, gallery, instructions, package, shaders, tidy, vulkan};
 
 pub(crate) fn run() -> Result<(), CheckError> {
     tidy::run()?;
@@ -29,5 +29,6 @@ pub(crate) fn run() -> Result<(), CheckError> {
     if let Some(finding) = found.first() {
         return Err(CheckError::Failed(format!("{}: {}", finding.name(), finding.why())));
     }
-    gallery::run_built(true)
+    gallery::run_built(true)?;
+    instructions::run_built(false)
 }

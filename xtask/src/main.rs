@@ -7,7 +7,9 @@ mod ci;
 mod docs;
 mod gallery;
 mod html;
+mod instructions;
 mod package;
+mod results;
 mod shaders;
 mod shell;
 mod snapshots;
@@ -56,6 +58,17 @@ enum Command {
         #[arg(last = true)]
         arguments: Vec<String>,
     },
+    /// Counts the instructions of every technique by valgrind, and compares with what is kept.
+    Instructions {
+        /// Keep what was counted.
+        #[arg(long)]
+        accept: bool,
+    },
+    /// Runs what README.md and RESULTS.md say their figures are made by, and puts the output there.
+    Results {
+        /// Only blocks whose line holds one of these [default: all]
+        words: Vec<String>,
+    },
     /// Builds the documentation with and without the feature `gpu`; a warning is a failure.
     Docs,
 }
@@ -68,6 +81,8 @@ fn main() -> ExitCode {
         Command::Docs => docs::run(),
         Command::Snapshots { accept } => snapshots::run(accept),
         Command::Gallery { check } => gallery::run(check),
+        Command::Instructions { accept } => instructions::run(accept),
+        Command::Results { words } => results::run(&words),
         Command::Package => package::run(),
         Command::Bench { names, arguments } => bench::run(&names, &arguments),
     };

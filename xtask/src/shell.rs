@@ -95,6 +95,27 @@ pub(crate) fn cargo_output(arguments: &[&str]) -> Result<String, CheckError> {
     output_of(&cargo_program(), arguments)
 }
 
+/// What a program prints on stdout and, in short, that it failed; run in the workspace with extra environment.
+pub(crate) fn output_even_if_failed(
+    program: &str,
+    arguments: &[&str],
+    environment: &[(&str, String)],
+) -> Result<String, CheckError> {
+    let output = Command::new(program)
+        .args(arguments)
+        .envs(environment.iter().map(|(name, value)| (name, value)))
+        .current_dir(root())
+        .stderr(Stdio::inherit())
+        .output()
+        .map_err(|source| CheckError::Start { program: program.to_owned(), source })?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    match (output.status.success(), text.trim().is_empty()) {
+        (true, _) => Ok(text),
+        (false, false) => Ok(format!("{text}\n({})", output.status)),
+        (false, true) => Err(CheckError::Failed(format!("{program} {}", arguments.join(" ")))),
+    }
+}
+
 /// What a program prints on stdout, run in the workspace.
 pub(crate) fn output_of(program: &str, arguments: &[&str]) -> Result<String, CheckError> {
     let output = Command::new(program)

@@ -34,7 +34,7 @@ pub(crate) enum Kind {
     Rays { samples: u32, skip: bool },
 }
 
-/// Every technique in `names` (none: all there are), in every preset and variant, then ray tracing.
+/// Every technique in `names` (none: all there are), in every preset and variant that go together, then ray tracing.
 pub(crate) fn all(names: &[String], seed: u64) -> Result<Vec<Contender>, CliError> {
     let factories: Vec<&'static dyn TechniqueFactory> = if names.is_empty() {
         crate::techniques::all().to_vec()
@@ -45,11 +45,15 @@ pub(crate) fn all(names: &[String], seed: u64) -> Result<Vec<Contender>, CliErro
     for factory in factories {
         // Two ways to the same settings are one contender.
         let mut seen = std::collections::BTreeSet::new();
-        let default = factory.create(None, &with_seed(factory, &[], seed))?.settings();
+        let default = factory.create(None, &with_seed(factory, &[], seed))?;
+        let (default, default_variant) = (default.settings(), variant_of(default.as_ref()));
         for preset in std::iter::once(None).chain(factory.presets().into_iter().map(Some)) {
+            let own = variant_of(factory.create(preset, &with_seed(factory, &[], seed))?.as_ref());
+            // A preset that chooses a variant is for that one.
+            let is_bound = preset.is_some() && own != default_variant;
             let choices: Vec<Option<&str>> = match variants(factory) {
-                [] => vec![None],
-                variants => variants.iter().copied().map(Some).collect(),
+                variants if !is_bound && !variants.is_empty() => variants.iter().copied().map(Some).collect(),
+                _ => vec![None],
             };
             for variant in choices {
                 let overrides: Vec<(String, String)> =

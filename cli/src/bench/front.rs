@@ -91,7 +91,7 @@ pub(crate) fn places<'a>(
 }
 
 /// Geometric means over scenes, of the contenders that were measured on every one of them.
-pub(crate) fn geometric_means(scenes: &[Vec<Place>]) -> Vec<Place> {
+fn geometric_means(scenes: &[Vec<Place>]) -> Vec<Place> {
     let mut sums: BTreeMap<&str, (usize, f64, f64, &str)> = BTreeMap::new();
     for place in scenes.iter().flatten() {
         let sum = sums.entry(&place.name).or_insert((0, 0.0, 0.0, &place.technique));
@@ -148,6 +148,19 @@ pub(crate) fn by_scene(records: &[Record]) -> BTreeMap<String, Vec<&Record>> {
         scenes.entry(name).or_default().push(record);
     }
     scenes
+}
+
+/// Scenes whose light throws penumbrae.
+pub(crate) fn soft_scenes(records: &[Record]) -> Vec<Vec<&Record>> {
+    let scenes = by_scene(records).into_values();
+    scenes.filter(|records| records.iter().all(|r| r.extended && r.penumbra > 0.0)).collect()
+}
+
+/// Geometric means over soft scenes.
+pub(crate) fn soft_means(soft: &[Vec<&Record>], time: Time, error: Error) -> Vec<Place> {
+    let each: Vec<Vec<Place>> =
+        soft.iter().map(|records| places(records.iter().copied(), time, error)).collect();
+    geometric_means(&each)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::charts::{self, Chart};
-use super::front::{Error, Place, Time, by_scene, geometric_means, pareto, places, rays_ms_at};
+use super::front::{Error, Time, by_scene, pareto, places, rays_ms_at, soft_means, soft_scenes};
 use super::pictures;
 use super::record::{Outcome, Record};
 use super::station::Axis;
@@ -61,9 +61,7 @@ pub(crate) fn page(records: &[Record], folder: &Path) -> Result<Page, CliError> 
 
 /// Means over all scenes whose light throws penumbrae.
 fn overall(records: &[Record], charts: &mut Vec<Chart>) -> Result<String, CliError> {
-    let scenes = by_scene(records);
-    let soft: Vec<&Vec<&Record>> =
-        scenes.values().filter(|records| records.iter().all(|r| r.extended && r.penumbra > 0.0)).collect();
+    let soft = soft_scenes(records);
     if soft.len() < 2 {
         return Ok(String::new());
     }
@@ -75,9 +73,7 @@ fn overall(records: &[Record], charts: &mut Vec<Chart>) -> Result<String, CliErr
         (Time::Frame, Error::Rmse, "soft-rmse-frame"),
         (Time::Frame, Error::PenRmse, "soft-pen-rmse-frame"),
     ] {
-        let each: Vec<Vec<Place>> =
-            soft.iter().map(|records| places(records.iter().copied(), time, error)).collect();
-        let means = geometric_means(&each);
+        let means = soft_means(&soft, time, error);
         let title = format!("{} scenes with penumbrae, geometric means", soft.len());
         let chart = charts::time_against_error(file.to_owned(), title, &means, time, error)?;
         push_chart(&mut figures, charts, chart);

@@ -17,6 +17,8 @@ use super::machine::Machine;
 use super::station::Point;
 use crate::error::CliError;
 use crate::measure::Repeated;
+use crate::recommend::features::Features;
+use crate::recommend::preview::Tried;
 
 /// The file of records in a folder.
 pub(crate) const FILE: &str = "results.jsonl";
@@ -53,6 +55,10 @@ pub(crate) struct Record {
     pub(crate) settings: Value,
     pub(crate) seed: u64,
     pub(crate) machine: Machine,
+    /// What the scene is like, and what the contender came to on a small picture of it: what `recommend` learns from. None on
+    /// cost curves, the latter for rays and on the GPU, too.
+    pub(crate) features: Option<Features>,
+    pub(crate) tried: Option<Tried>,
     pub(crate) outcome: Outcome,
 }
 
@@ -139,6 +145,11 @@ impl Record {
     pub(crate) fn shares(&self) -> Shares {
         Shares { lit: self.lit, penumbra: self.penumbra, umbra: self.umbra }
     }
+}
+
+/// The median; NaN for no value.
+pub(crate) fn median(values: Vec<f64>) -> f64 {
+    median_and_spread(values).0
 }
 
 /// Median, and third quartile minus first, linear between neighbours. NaN for no value.
@@ -279,6 +290,8 @@ pub(crate) mod tests {
             settings: Value::Null,
             seed: 0,
             machine: Machine::this(),
+            features: None,
+            tried: None,
             outcome: Outcome::Measured(Measured {
                 runs: 3,
                 prepare_ms: ms / 2.0,

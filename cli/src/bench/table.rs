@@ -1,9 +1,12 @@
 //! `results.csv`, and the table for a terminal.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use serde::Serialize;
 
-use super::front::{Error, Time, by_scene, pareto, places, rays_ms_at};
+use super::front::{Error, Place, Time, by_scene, pareto, places, rays_ms_at, soft_means, soft_scenes};
 use super::record::{Outcome, Record};
+use super::station::Axis;
 use crate::compare::table::{aligned, error_text, milliseconds};
 use crate::error::CliError;
 
@@ -91,21 +94,83 @@ pub(crate) fn csv(records: &[Record]) -> Result<Vec<u8>, CliError> {
     writer.into_inner().map_err(|error| encode(error.to_string().into()))
 }
 
-/// The Pareto front of every scene, fastest first.
-pub(crate) fn fronts(records: &[Record]) -> String {
-    let mut text = String::new();
+/// For a terminal: the means over soft scenes, the Pareto front of every scene, fastest first, and the cost curves.
+pub(crate) fn text(records: &[Record]) -> String {
+    let mut text = overall(records);
     for (scene, records) in by_scene(records) {
         let places = places(records.iter().copied(), Time::Whole, Error::Rmse);
-        let mut lines =
-            vec![["  nothing is both faster and closer than", "ms", "rmse", "rays / it"].map(str::to_owned)];
-        for place in pareto(&places) {
-            let rays = rays_ms_at(&places, place.error, true)
-                .filter(|_| !place.is_rays())
-                .map_or_else(|| "-".to_owned(), |ms| format!("{:.1}x", ms / place.ms));
-            lines.push([format!("  {}", place.name), milliseconds(place.ms), error_text(place.error), rays]);
-        }
-        text.push_str(&format!("{scene}\n{}\n", aligned(&lines)));
+        text.push_str(&format!("{scene}\n{}\n", front(&places)));
     }
+    for axis in [Axis::Triangles, Axis::Image, Axis::Map, Axis::Light] {
+        text.push_str(&curve(axis, records));
+    }
+    text
+}
+
+/// The front of the geometric means over soft scenes, whole and while only the camera moves.
+fn overall(records: &[Record]) -> String {
+    let soft = soft_scenes(records);
+    if soft.len() < 2 {
+        return String::new();
+    }
+    let mut text = String::new();
+    for (time, what) in
+        [(Time::Whole, "prepare and shade"), (Time::Frame, "a frame while only the camera moves")]
+    {
+        let means = soft_means(&soft, time, Error::Rmse);
+        text.push_str(&format!("{} soft scenes, geometric means, {what}\n{}\n", soft.len(), front(&means)));
+    }
+    text
+}
+
+/// The places that nothing beats, beside what ray tracing takes for the same error, plain and with skipping.
+fn front(places: &[Place]) -> String {
+    let heading = ["  nothing is both faster and closer than", "ms", "rmse", "plain rays / it", "rays / it"];
+    let mut lines = vec![heading.map(str::to_owned)];
+    for place in pareto(places) {
+        let rays = |skipping: bool| {
+            rays_ms_at(places, place.error, skipping)
+                .filter(|_| !place.is_rays())
+                .map_or_else(|| "-".to_owned(), |ms| format!("{:.1}x", ms / place.ms))
+        };
+        lines.push([
+            format!("  {}", place.name),
+            milliseconds(place.ms),
+            error_text(place.error),
+            rays(false),
+            rays(true),
+        ]);
+    }
+    aligned(&lines)
+}
+
+/// Milliseconds of every contender over one axis; nothing where it was not measured.
+fn curve(axis: Axis, records: &[Record]) -> String {
+    let mut rows: BTreeMap<String, BTreeMap<u64, f64>> = BTreeMap::new();
+    for record in records {
+        if let (Some(point), Some(measured)) = (record.point.filter(|p| p.axis == axis), record.measured()) {
+            // Bits of positive numbers are in the order of the numbers.
+            rows.entry(record.name()).or_default().insert(point.value.to_bits(), measured.whole_ms());
+        }
+    }
+    let values: BTreeSet<u64> = rows.values().flat_map(|row| row.keys().copied()).collect();
+    if values.is_empty() {
+        return String::new();
+    }
+    let mut text = format!("{:<36}", format!("ms by {}", axis.label()));
+    for value in &values {
+        text.push_str(&format!(" {:>9}", f64::from_bits(*value)));
+    }
+    text.push('\n');
+    for (name, row) in rows {
+        text.push_str(&format!("  {name:<34}"));
+        for value in &values {
+            let cell = row.get(value).map_or_else(|| "-".to_owned(), |ms| milliseconds(*ms));
+            text.push_str(&format!(" {cell:>9}"));
+        }
+        text.push('\n');
+    }
+    text.push('\n');
     text
 }
 
@@ -125,8 +190,10 @@ mod tests {
         let csv = String::from_utf8(csv(&records).unwrap()).unwrap();
         assert_eq!(csv.lines().count(), 5);
         assert!(csv.starts_with("scene,axis,axis_value,light,"));
-        let text = fronts(&records);
-        assert_eq!(text.matches("shadow-map hard").count(), 1, "{text}");
-        assert_eq!(text.matches("rays 4").count(), 2, "{text}");
+        let text = text(&records);
+        // On one of the two scenes, and in both means.
+        assert_eq!(text.matches("  shadow-map hard ").count(), 3, "{text}");
+        assert!(text.matches("  rays 4 ").count() >= 2, "{text}");
+        assert!(text.contains("2 soft scenes"), "{text}");
     }
 }

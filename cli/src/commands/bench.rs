@@ -25,11 +25,16 @@ use crate::ground_truth::GroundTruth;
 use crate::measure::{Repeats, Run, Stand, milliseconds_since, repeat};
 use crate::output::OutputFolder;
 use crate::picture::shading::Shading;
+use crate::recommend::data::Data;
+use crate::recommend::preview::Preview;
 use crate::report::{RunReport, Subject};
 use crate::scene_source::View;
 
 /// Milliseconds after which a cell is not repeated.
 const BUDGET_MS: f64 = 2000.0;
+
+/// What takes longer to prepare is not tried on a small picture, and so not recommended.
+const LONGEST_TRIAL_MS: f64 = 5000.0;
 
 pub(crate) fn run(args: &BenchArgs, console: &Console) -> Result<(), CliError> {
     let out = OutputFolder::check(&args.out)?;
@@ -48,8 +53,10 @@ pub(crate) fn run(args: &BenchArgs, console: &Console) -> Result<(), CliError> {
         page::page(&records, &pictures)?
     };
     let csv = table::csv(&records)?;
+    let measurements = Data::from_records(&records).csv()?;
     out.write(|to| {
         write::bytes(&to.join("results.csv"), &csv)?;
+        write::bytes(&to.join("recommend.csv"), &measurements)?;
         write::json(&to.join("results.json"), &records)?;
         for chart in &page.charts {
             write::bytes(&to.join(format!("{}.svg", chart.file)), chart.svg.as_bytes())?;
@@ -58,7 +65,7 @@ pub(crate) fn run(args: &BenchArgs, console: &Console) -> Result<(), CliError> {
         write::bytes(&to.join("index.html"), &page.html)
     })?;
     console.note(&format!("wrote {}", out.path().join("index.html").display()));
-    console.result(&records, &table::fronts(&records))
+    console.result(&records, &table::text(&records))
 }
 
 /// A contender on a side of a station.
@@ -155,6 +162,11 @@ fn is_rays(contender: &Contender) -> bool {
     matches!(contender.kind, Kind::Rays { .. })
 }
 
+/// Whether preparing takes so little that `recommend` may try it.
+fn is_quick(outcome: &Outcome) -> bool {
+    matches!(outcome, Outcome::Measured(measured) if measured.prepare_ms < LONGEST_TRIAL_MS)
+}
+
 /// A station with its ground truth.
 struct Site<'a> {
     station: &'a Station,
@@ -163,6 +175,8 @@ struct Site<'a> {
     truth: GroundTruth,
     shares: metrics::Shares,
     shading: Shading,
+    /// None on cost curves.
+    preview: Option<Preview>,
     pictures: std::path::PathBuf,
 }
 
@@ -183,8 +197,12 @@ impl<'a> Site<'a> {
             let path = pictures::path(&pictures, &format!("{} truth", station.name()));
             pictures::write_truth(&path, &truth, &shading)?;
         }
+        let preview = match station.point {
+            None => Some(Preview::new(view.clone(), args.seed)?),
+            Some(_) => None,
+        };
         let shares = metrics::shares(&truth.visibility, &truth.valid)?;
-        Ok(Self { station, view, gbuffer, truth, shares, shading, pictures })
+        Ok(Self { station, view, gbuffer, truth, shares, shading, preview, pictures })
     }
 
     /// Measures a cell.
@@ -223,6 +241,12 @@ impl<'a> Site<'a> {
             }
             Err(error) => return Err(error),
         };
+        let tried = match (&self.preview, &cell.contender.kind, cell.side) {
+            (Some(preview), Kind::Technique(technique), Side::Cpu) if is_quick(&outcome) => {
+                preview.try_out(technique.as_ref())?
+            }
+            _ => None,
+        };
         let light = self.view.light();
         Ok(Record {
             key: cell.key.clone(),
@@ -248,6 +272,8 @@ impl<'a> Site<'a> {
             settings,
             seed: args.seed,
             machine: machine.clone(),
+            features: self.preview.as_ref().map(|preview| *preview.features()),
+            tried,
             outcome,
         })
     }

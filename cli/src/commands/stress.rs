@@ -42,6 +42,13 @@ pub(crate) fn run(args: &StressArgs, console: &Console) -> Result<(), CliError> 
     let mut cells: Vec<Cell> = Vec::new();
     // Errors on scenes as they are, by trial and technique: what changed scenes are held against.
     let mut base_rmse: BTreeMap<(String, String, &str), f64> = BTreeMap::new();
+    for (what, said) in trial::refusals() {
+        let verdict = match said {
+            Some(why) => Verdict::Refused { why },
+            None => Verdict::Fail { why: "a scene took it".to_owned() },
+        };
+        cells.push(Cell { trial: what.to_owned(), technique: "loading".to_owned(), backend: "-", verdict });
+    }
     let bar = console.progress("stress");
     for (number, trial) in trials.iter().enumerate() {
         let view = &trial.view;

@@ -92,3 +92,29 @@ pub(crate) fn needles(mesh: &mut TriangleMesh) {
         mesh.triangles.push([a, b, cut]);
     }
 }
+
+/// On every triangle the one of its sides' middles, in the same plane but for an ulp: two surfaces in one place.
+pub(crate) fn overlapping(mesh: &mut TriangleMesh) {
+    if mesh.alpha.is_some() {
+        return;
+    }
+    for i in 0..mesh.triangles.len() {
+        let corners = mesh.triangles[i].map(|corner| mesh.positions[corner as usize]);
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend([0, 1, 2].map(|side| corners[side].midpoint(corners[(side + 1) % 3])));
+        mesh.triangles.push([first, first + 1, first + 2]);
+    }
+}
+
+/// A fin without width on every triangle: its first side is shared by a third face, which has no area to throw a shadow with.
+pub(crate) fn finned(mesh: &mut TriangleMesh) {
+    if mesh.alpha.is_some() {
+        return;
+    }
+    for i in 0..mesh.triangles.len() {
+        let [a, b, _] = mesh.triangles[i];
+        let tip = mesh.positions.len() as u32;
+        mesh.positions.push(mesh.positions[a as usize].midpoint(mesh.positions[b as usize]));
+        mesh.triangles.push([b, a, tip]);
+    }
+}

@@ -56,11 +56,13 @@ fn same_image(base: &str, setup: &SceneSetup, trials: &mut Vec<Trial>) -> Result
             change::similarity(setup, 1.0, Vec3::new(1.0, 0.5, -1.0) * far * size).map_err(broken)?;
         push(trials, format!("{base} {far:e} sizes away"), Some(base), changed);
     }
-    let edits: [(&str, Edit); 4] = [
+    let edits: [(&str, Edit); 6] = [
         ("triangles twice", change::duplicated),
         ("half wound the other way", change::inverted),
         ("triangles without area", change::degenerate),
         ("needle triangles", change::needles),
+        ("coplanar overlaps", change::overlapping),
+        ("three faces at an edge", change::finned),
     ];
     for (what, edit) in edits {
         let changed = change::rebuilt(setup, |_, mesh| edit(mesh)).map_err(broken)?;
@@ -152,6 +154,23 @@ fn geometry(quick: bool, trials: &mut Vec<Trial>) -> Result<(), CliError> {
         push(trials, "ten million triangles".to_owned(), None, forest);
     }
     Ok(())
+}
+
+/// Meshes that no scene may take: what they are, and what the scene says to them; `None` if it took them.
+pub(crate) fn refusals() -> Vec<(&'static str, Option<String>)> {
+    let corners = |third: Vec3| vec![Vec3::ZERO, Vec3::X, third];
+    let say = |mesh: &TriangleMesh| {
+        Scene::new()
+            .add(mesh, Affine3A::IDENTITY, ObjectFlags::default())
+            .err()
+            .map(|error| error.to_string())
+    };
+    let mesh = |third, triangle| TriangleMesh::new("broken", corners(third), vec![triangle]);
+    vec![
+        ("a corner that is not a number", say(&mesh(Vec3::new(0.0, f32::NAN, 0.0), [0, 1, 2]))),
+        ("a corner at infinity", say(&mesh(Vec3::new(0.0, f32::INFINITY, 0.0), [0, 1, 2]))),
+        ("a corner that is not there", say(&mesh(Vec3::Y, [0, 1, 3]))),
+    ]
 }
 
 /// Corners of `count` triangles in the cube around the origin: they cut each other, and no edge is shared. Weyl's

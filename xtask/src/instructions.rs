@@ -1,0 +1,153 @@
+//! `cargo xtask instructions [--accept]`: how many instructions the techniques take.
+//!
+//! Milliseconds of a shared machine guard nothing; instructions of one thread do. `valgrind --tool=callgrind` counts those between the
+//! ends of one run, prepare and shade, of each technique's default on a small picture; `xtask/instructions.json` keeps them. More than
+//! [`GROWTH`] of them is a failure, and so are much fewer, until they are accepted: a gain is guarded, too.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
+
+use crate::shell::{CheckError, cargo, output_of, root, target};
+
+/// By how much counts may differ from what is kept: compilers of one version, and processors with other vectors, come closer.
+const GROWTH: f64 = 1.05;
+
+/// The function whose instructions count, with all that it calls.
+const COUNTED: &str = "*Stand*on_cpu*";
+
+/// Scenes that kernels are counted on: small triangles in front of a round light, and cut-out masks.
+const SCENES: [&str; 2] = ["ball", "log-cabin"];
+
+/// Builds the command as the tests do, then counts.
+pub(crate) fn run(accept: bool) -> Result<(), CheckError> {
+    cargo(&["test", "--profile", "ci", "--workspace", "--test", "cli", "--no-run"], &[])?;
+    run_built(accept)
+}
+
+/// [`run`] with the command that the tests have built.
+pub(crate) fn run_built(accept: bool) -> Result<(), CheckError> {
+    install()?;
+    let counted = count_all()?;
+    let path = kept_path();
+    if accept {
+        let text =
+            serde_json::to_string_pretty(&counted).map_err(|e| CheckError::Failed(e.to_string()))? + "\n";
+        return fs::write(&path, text).map_err(|source| CheckError::Write { path, source });
+    }
+    let text = fs::read_to_string(&path).map_err(|source| CheckError::Read { path: path.clone(), source })?;
+    let kept: BTreeMap<String, u64> = serde_json::from_str(&text)
+        .map_err(|error| CheckError::Failed(format!("{}: {error}", path.display())))?;
+    let faults = faults(&kept, &counted);
+    if faults.is_empty() { Ok(()) } else { Err(CheckError::Rules(faults)) }
+}
+
+fn kept_path() -> PathBuf {
+    root().join("xtask/instructions.json")
+}
+
+/// What differs, a line each.
+fn faults(kept: &BTreeMap<String, u64>, counted: &BTreeMap<String, u64>) -> Vec<String> {
+    let mut faults = Vec::new();
+    for (kernel, &now) in counted {
+        let Some(&before) = kept.get(kernel) else {
+            faults.push(format!("{kernel}: no count is kept"));
+            continue;
+        };
+        let ratio = now as f64 / before.max(1) as f64;
+        if !(1.0 / GROWTH..=GROWTH).contains(&ratio) {
+            faults.push(format!("{kernel}: {now} instructions, {before} are kept: {ratio:.2} times as many"));
+        }
+    }
+    faults.extend(
+        kept.keys()
+            .filter(|kernel| !counted.contains_key(*kernel))
+            .map(|k| format!("{k}: not counted any more")),
+    );
+    if !faults.is_empty() {
+        faults.push("if that is as it should be: `cargo xtask instructions --accept`".to_owned());
+    }
+    faults
+}
+
+/// Every technique on every scene.
+fn count_all() -> Result<BTreeMap<String, u64>, CheckError> {
+    let program =
+        target().join("ci").join(format!("gnomon{}", std::env::consts::EXE_SUFFIX)).display().to_string();
+    let listed = output_of(&program, &["techniques", "--json"])?;
+    let listed: serde_json::Value = serde_json::from_str(&listed)
+        .map_err(|error| CheckError::Failed(format!("gnomon techniques --json: {error}")))?;
+    let names = listed.as_array().into_iter().flatten().filter_map(|technique| technique["name"].as_str());
+    let mut counts = BTreeMap::new();
+    for name in names {
+        for scene in SCENES {
+            let count = count(&program, name, scene)?;
+            eprintln!("    {name} on {scene}: {count} instructions");
+            counts.insert(format!("{name} on {scene}"), count);
+        }
+    }
+    Ok(counts)
+}
+
+fn count(program: &str, technique: &str, scene: &str) -> Result<u64, CheckError> {
+    let out = target().join("instructions");
+    let place = out.display().to_string();
+    fs::create_dir_all(&out).map_err(|source| CheckError::Write { path: out.clone(), source })?;
+    let file = out.join("callgrind.out");
+    let file_option = format!("--callgrind-out-file={}", file.display());
+    let collect = format!("--toggle-collect={COUNTED}");
+    let render = ["render", scene, "--technique", technique, "--size", "64x48", "--backend", "cpu"];
+    let one = ["--threads", "1", "--out", &place];
+    let valgrind = ["--quiet", "--tool=callgrind", &file_option, &collect, program];
+    output_of("valgrind", &[&valgrind[..], &render[..], &one[..]].concat())?;
+    let profile =
+        fs::read_to_string(&file).map_err(|source| CheckError::Read { path: file.clone(), source })?;
+    total(&profile)
+        .filter(|&total| total > 0)
+        .ok_or_else(|| CheckError::Failed(format!("{} counts nothing in {COUNTED}", file.display())))
+}
+
+/// The total of a profile.
+fn total(profile: &str) -> Option<u64> {
+    profile.lines().find_map(|line| line.strip_prefix("totals:")?.trim().parse().ok())
+}
+
+/// Installs valgrind where it is not there and that is possible.
+fn install() -> Result<(), CheckError> {
+    let is_there =
+        || Command::new("valgrind").arg("--version").output().is_ok_and(|out| out.status.success());
+    if is_there() {
+        return Ok(());
+    }
+    eprintln!("==> installing valgrind");
+    let apt =
+        |words: &[&str]| Command::new("apt-get").args(words).status().is_ok_and(|status| status.success());
+    let _ = apt(&["update", "-q"]);
+    if apt(&["install", "-qy", "--no-install-recommends", "valgrind"]) && is_there() {
+        return Ok(());
+    }
+    Err(CheckError::Failed("instructions are counted by valgrind: install the package valgrind".to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_or_much_fewer_instructions_are_a_fault() {
+        let map = |a: u64| BTreeMap::from([("a".to_owned(), a)]);
+        assert!(faults(&map(1000), &map(1020)).is_empty());
+        for now in [1100, 900] {
+            assert_eq!(faults(&map(1000), &map(now)).len(), 2, "{now}");
+        }
+        assert_eq!(faults(&BTreeMap::new(), &map(1)).len(), 2);
+        assert_eq!(faults(&map(1), &BTreeMap::new()).len(), 2);
+    }
+
+    #[test]
+    fn a_profile_has_a_total() {
+        assert_eq!(total("events: Ir\nfn=(1)\n1 2\ntotals: 8895770\n"), Some(8_895_770));
+        assert_eq!(total("events: Ir\n"), None);
+    }
+}
