@@ -22,7 +22,7 @@ const MAX_BYTES: usize = 64 << 10;
 const PROJECT: Figure = Figure {
     file: "docs/compare.png",
     scene: "knot",
-    size: "220x165",
+    size: "180x135",
     techniques: &[],
     variants: false,
     left_out: &[],

@@ -48,7 +48,7 @@ impl Goal {
 
     /// Labels worth trying, from what is expected at sight, the most promising first: those that may keep the limit if they do
     /// one deviation better than expected.
-    pub(crate) fn short_list<'a>(self, mut at_sight: Vec<(&'a str, Expected)>) -> Vec<&'a str> {
+    pub(crate) fn short_list(self, mut at_sight: Vec<(&str, Expected)>) -> Vec<&str> {
         self.order(&mut at_sight, -1.0);
         at_sight.into_iter().map(|(label, _)| label).collect()
     }

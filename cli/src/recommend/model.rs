@@ -55,7 +55,7 @@ impl Model {
         }
         let fitted = lines.into_iter().filter_map(|(label, lines)| {
             let at_sight = fit(&lines, time, |line| Some([features_of(line), features_of(line)]))?;
-            let tried = fit(&lines, time, |line| Some(with_tried(features_of(line), &line.tried()?, time)));
+            let tried = fit(&lines, time, |line| Some(with_tried(&features_of(line), &line.tried()?, time)));
             Some((label, OfContender { at_sight, tried }))
         });
         Self { contenders: fitted.collect() }
@@ -81,7 +81,7 @@ impl Model {
         Some(match &of.tried {
             None => of.at_sight.at(&features, &features),
             Some(fit) => {
-                let [ms, rmse] = with_tried(features, tried, time);
+                let [ms, rmse] = with_tried(&features, tried, time);
                 fit.at(&ms, &rmse)
             }
         })
@@ -93,7 +93,7 @@ fn features_of(line: &Line) -> Vec<f64> {
 }
 
 /// Features with what a trial says of time, and with what it says of the error.
-fn with_tried(features: Vec<f64>, tried: &Tried, time: Time) -> [Vec<f64>; 2] {
+fn with_tried(features: &[f64], tried: &Tried, time: Time) -> [Vec<f64>; 2] {
     let with = |last: f64| features.iter().copied().chain([last]).collect();
     [with(tried.ms(time).max(1e-3).ln()), with((tried.rmse + ERROR_FLOOR).ln())]
 }
