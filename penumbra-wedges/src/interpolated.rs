@@ -81,7 +81,7 @@ impl Side {
     }
 }
 
-/// The half-spaces outside of which [`share`] is certain: the side planes, and a front and a back plane that hold whatever
+/// The half-spaces outside of which `share` is certain: the side planes, and a front and a back plane that hold whatever
 /// lies between those of either end.
 ///
 /// Let ê be the edge's direction, N the normal of the plane of edge and light's middle, m the unit vector in it across ê, away
