@@ -9,6 +9,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
+use crate::apt;
 use crate::shell::{CheckError, cargo, output_of, root, target};
 
 /// By how much counts may differ from what is kept: compilers of one version, and processors with other vectors, come closer.
@@ -122,19 +123,11 @@ fn total(profile: &str) -> Option<u64> {
 
 /// Installs valgrind where it is not there and that is possible.
 fn install() -> Result<(), CheckError> {
-    let is_there =
-        || Command::new("valgrind").arg("--version").output().is_ok_and(|out| out.status.success());
-    if is_there() {
+    let is_there = Command::new("valgrind").arg("--version").output().is_ok_and(|out| out.status.success());
+    if is_there {
         return Ok(());
     }
-    eprintln!("==> installing valgrind");
-    let apt =
-        |words: &[&str]| Command::new("apt-get").args(words).status().is_ok_and(|status| status.success());
-    let _ = apt(&["update", "-q"]);
-    if apt(&["install", "-qy", "--no-install-recommends", "valgrind"]) && is_there() {
-        return Ok(());
-    }
-    Err(CheckError::Failed("instructions are counted by valgrind: install the package valgrind".to_owned()))
+    apt::install("valgrind", "instructions are counted by valgrind: install the package valgrind")
 }
 
 #[cfg(test)]

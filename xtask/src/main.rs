@@ -2,6 +2,7 @@
 //!
 //! `cargo xtask ci` runs them all, as CI does.
 
+mod apt;
 mod bench;
 mod ci;
 mod docs;

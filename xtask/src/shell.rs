@@ -1,7 +1,7 @@
 //! Running cargo and reading the tree.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::time::Instant;
 
 use thiserror::Error;
@@ -95,19 +95,22 @@ pub(crate) fn cargo_output(arguments: &[&str]) -> Result<String, CheckError> {
     output_of(&cargo_program(), arguments)
 }
 
-/// What a program prints on stdout and, in short, that it failed; run in the workspace with extra environment.
+/// What a program prints on stdout, run in the workspace.
+pub(crate) fn output_of(program: &str, arguments: &[&str]) -> Result<String, CheckError> {
+    let output = captured(program, arguments, &[])?;
+    if !output.status.success() {
+        return Err(CheckError::Failed(format!("{program} {}", arguments.join(" "))));
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+/// [`output_of`] with extra environment. A program that prints and then fails has said why: its status is put below.
 pub(crate) fn output_even_if_failed(
     program: &str,
     arguments: &[&str],
     environment: &[(&str, String)],
 ) -> Result<String, CheckError> {
-    let output = Command::new(program)
-        .args(arguments)
-        .envs(environment.iter().map(|(name, value)| (name, value)))
-        .current_dir(root())
-        .stderr(Stdio::inherit())
-        .output()
-        .map_err(|source| CheckError::Start { program: program.to_owned(), source })?;
+    let output = captured(program, arguments, environment)?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     match (output.status.success(), text.trim().is_empty()) {
         (true, _) => Ok(text),
@@ -116,16 +119,13 @@ pub(crate) fn output_even_if_failed(
     }
 }
 
-/// What a program prints on stdout, run in the workspace.
-pub(crate) fn output_of(program: &str, arguments: &[&str]) -> Result<String, CheckError> {
-    let output = Command::new(program)
+/// Runs a program in the workspace; what it says on stderr goes to where ours goes.
+fn captured(program: &str, arguments: &[&str], environment: &[(&str, String)]) -> Result<Output, CheckError> {
+    Command::new(program)
         .args(arguments)
+        .envs(environment.iter().map(|(name, value)| (name, value)))
         .current_dir(root())
         .stderr(Stdio::inherit())
         .output()
-        .map_err(|source| CheckError::Start { program: program.to_owned(), source })?;
-    if !output.status.success() {
-        return Err(CheckError::Failed(format!("{program} {}", arguments.join(" "))));
-    }
-    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+        .map_err(|source| CheckError::Start { program: program.to_owned(), source })
 }

@@ -3,8 +3,8 @@
 use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
+use crate::apt;
 use crate::shell::CheckError;
 
 /// Mesa's software Vulkan on Debian and Ubuntu.
@@ -100,26 +100,7 @@ fn has_gpu() -> bool {
 
 /// Installs the software driver where that takes no password.
 fn install() -> Result<(), CheckError> {
-    let prints = |program: &str, arguments: &[&str]| {
-        Command::new(program).args(arguments).output().ok().filter(|output| output.status.success())
-    };
-    let is_root = prints("id", &["-u"]).is_some_and(|output| output.stdout.trim_ascii() == b"0");
-    if !is_root || prints("apt-get", &["--version"]).is_none() {
-        return Err(CheckError::Failed(missing()));
-    }
-    eprintln!("==> GPU: no Vulkan driver; installing {PACKAGE}");
-    for arguments in [&["update"][..], &["install", "--yes", "--no-install-recommends", PACKAGE]] {
-        let line = format!("apt-get {}", arguments.join(" "));
-        let status = Command::new("apt-get")
-            .args(arguments)
-            .env("DEBIAN_FRONTEND", "noninteractive")
-            .status()
-            .map_err(|source| CheckError::Start { program: "apt-get".to_owned(), source })?;
-        if !status.success() {
-            return Err(CheckError::Failed(format!("{line}\n{}", missing())));
-        }
-    }
-    Ok(())
+    apt::install(PACKAGE, &missing())
 }
 
 fn missing() -> String {
