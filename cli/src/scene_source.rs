@@ -65,6 +65,14 @@ pub(crate) fn view(args: &SceneArgs, console: &Console) -> Result<View, CliError
     Ok(View { setup, light_index: args.light })
 }
 
+/// The scenes that are named; every built-in one where none is.
+pub(crate) fn or_built_in(names: &[String]) -> Vec<String> {
+    if names.is_empty() {
+        return scenes::all().iter().map(|scene| scene.name.to_owned()).collect();
+    }
+    names.to_vec()
+}
+
 fn load(scene: &str, time: Option<f32>) -> Result<SceneSetup, SceneSourceError> {
     if is_built_in(scene.split_once(':').map_or(scene, |(name, _)| name).trim()) {
         return Ok(scenes::build(scene, time.unwrap_or(0.0))?);

@@ -24,6 +24,20 @@ pub(crate) fn find(name: &str) -> Result<&'static dyn TechniqueFactory, CliError
     })
 }
 
+/// Those called by `names`; all of them where none is named.
+pub(crate) fn named(names: &[String]) -> Result<Vec<&'static dyn TechniqueFactory>, CliError> {
+    if names.is_empty() {
+        return Ok(all().to_vec());
+    }
+    names.iter().map(|name| find(name.trim())).collect()
+}
+
+/// What a technique with a preset and in a variant is called in tables.
+pub(crate) fn label(technique: &str, preset: Option<&str>, variant: &str) -> String {
+    let preset = preset.map_or_else(String::new, |preset| format!("@{preset}"));
+    format!("{technique}{preset} {variant}")
+}
+
 /// `overrides` and, if the technique draws random numbers and they do not say so already, `seed`.
 pub(crate) fn with_seed(
     technique: &dyn TechniqueFactory,

@@ -5,10 +5,10 @@
 
 use std::rc::Rc;
 
-use scene_core::technique::{ShadowTechnique, TechniqueFactory};
+use scene_core::technique::ShadowTechnique;
 
 use crate::error::CliError;
-use crate::techniques::{find, variant_of, variants, with_seed};
+use crate::techniques::{find, label, named, variant_of, variants, with_seed};
 
 /// Samples a pixel of the rows of ray tracing; a light with extent takes two at least.
 const RAYS: [u32; 5] = [1, 4, 16, 64, 256];
@@ -36,13 +36,8 @@ pub(crate) enum Kind {
 
 /// Every technique in `names` (none: all there are), in every preset and variant that go together, then ray tracing.
 pub(crate) fn all(names: &[String], seed: u64) -> Result<Vec<Contender>, CliError> {
-    let factories: Vec<&'static dyn TechniqueFactory> = if names.is_empty() {
-        crate::techniques::all().to_vec()
-    } else {
-        names.iter().map(|name| find(name.trim())).collect::<Result<_, _>>()?
-    };
     let mut contenders: Vec<Contender> = Vec::new();
-    for factory in factories {
+    for factory in named(names)? {
         // Two ways to the same settings are one contender.
         let mut seen = std::collections::BTreeSet::new();
         let default = factory.create(None, &with_seed(factory, &[], seed))?;
@@ -63,12 +58,8 @@ pub(crate) fn all(names: &[String], seed: u64) -> Result<Vec<Contender>, CliErro
                 if !seen.insert(settings.to_string()) {
                     continue;
                 }
-                let name = preset.map_or_else(
-                    || factory.name().to_owned(),
-                    |preset| format!("{}@{preset}", factory.name()),
-                );
                 contenders.push(Contender {
-                    label: format!("{name} {}", variant_of(technique.as_ref())),
+                    label: label(factory.name(), preset, &variant_of(technique.as_ref())),
                     preset,
                     is_default: settings == default,
                     kind: Kind::Technique(Rc::from(technique)),

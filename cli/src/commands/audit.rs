@@ -1,8 +1,8 @@
 //! `gnomon audit`: what skipping saves, and that it changes no image.
 
+use scene_core::VisibilityImage;
 use scene_core::raster::render_gbuffer;
-use scene_core::technique::{ShadowTechnique, TechniqueError, TechniqueFactory};
-use scene_core::{VisibilityImage, scenes};
+use scene_core::technique::{ShadowTechnique, TechniqueError};
 use serde::Serialize;
 
 use crate::args::{AuditArgs, SceneArgs};
@@ -13,8 +13,8 @@ use crate::compare::table::{aligned, milliseconds};
 use crate::console::Console;
 use crate::error::{CliError, count_of};
 use crate::measure::{Repeated, Repeats, Stand};
-use crate::techniques::{find, variant_of, variants, with_seed};
-use crate::{scene_source, techniques};
+use crate::scene_source;
+use crate::techniques::{label, named, variant_of, variants, with_seed};
 
 /// Milliseconds after which a cell is not repeated.
 const BUDGET_MS: f64 = 2000.0;
@@ -55,11 +55,7 @@ struct AuditReport {
 pub(crate) fn run(args: &AuditArgs, console: &Console) -> Result<(), CliError> {
     let pairs = pairs(&args.techniques, args.variants, args.seed)?;
     let gpu = backend::open(&args.backend)?;
-    let names: Vec<String> = if args.scenes.is_empty() {
-        scenes::all().iter().map(|scene| scene.name.to_owned()).collect()
-    } else {
-        args.scenes.clone()
-    };
+    let names = scene_source::or_built_in(&args.scenes);
     let bar = console.progress("audit");
     let mut cells: Vec<Cell> = Vec::new();
     for (number, name) in names.iter().enumerate() {
@@ -95,13 +91,8 @@ pub(crate) fn run(args: &AuditArgs, console: &Console) -> Result<(), CliError> {
 
 /// Techniques in words of the command line that have something to skip.
 fn pairs(words: &[String], every_variant: bool, seed: u64) -> Result<Vec<Pair>, CliError> {
-    let all: Vec<&'static dyn TechniqueFactory> = if words.is_empty() {
-        techniques::all().to_vec()
-    } else {
-        words.iter().map(|word| find(word.trim())).collect::<Result<_, _>>()?
-    };
     let mut pairs = Vec::new();
-    for factory in all {
+    for factory in named(words)? {
         if !factory.settings().iter().any(|setting| setting.name == SKIP) {
             continue;
         }
@@ -116,7 +107,7 @@ fn pairs(words: &[String], every_variant: bool, seed: u64) -> Result<Vec<Pair>, 
                 factory.create(None, &with_seed(factory, &overrides, seed))
             };
             let (on, off) = (make(true)?, make(false)?);
-            let label = format!("{} {}", factory.name(), variant_of(on.as_ref()));
+            let label = label(factory.name(), None, &variant_of(on.as_ref()));
             pairs.push(Pair { label, on, off });
         }
     }
@@ -206,7 +197,7 @@ mod tests {
     #[test]
     fn every_technique_can_be_told_not_to_skip() {
         let pairs = pairs(&[], true, 0).unwrap();
-        for factory in techniques::all() {
+        for factory in crate::techniques::all() {
             assert!(pairs.iter().any(|pair| pair.on.name() == factory.name()), "{}", factory.name());
         }
         for pair in &pairs {

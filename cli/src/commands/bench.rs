@@ -8,7 +8,7 @@ use scene_core::metrics;
 use scene_core::raster::render_gbuffer;
 use scene_core::reference::{ReferenceSettings, reference};
 use scene_core::technique::TechniqueError;
-use scene_core::{GBuffer, Report, scenes};
+use scene_core::{GBuffer, Report};
 use serde_json::json;
 
 use crate::args::{BenchArgs, TruthArgs};
@@ -28,7 +28,7 @@ use crate::picture::shading::Shading;
 use crate::recommend::data::Data;
 use crate::recommend::preview::Preview;
 use crate::report::{RunReport, Subject};
-use crate::scene_source::View;
+use crate::scene_source::{self, View};
 
 /// Milliseconds after which a cell is not repeated.
 const BUDGET_MS: f64 = 2000.0;
@@ -79,11 +79,7 @@ struct Cell {
 fn measure(args: &BenchArgs, console: &Console) -> Result<Vec<Record>, CliError> {
     let gpu = backend::open(&args.backend)?;
     let contenders = contender::all(&args.techniques, args.seed)?;
-    let scenes: Vec<String> = if args.scenes.is_empty() {
-        scenes::all().iter().map(|scene| scene.name.to_owned()).collect()
-    } else {
-        args.scenes.clone()
-    };
+    let scenes = scene_source::or_built_in(&args.scenes);
     let machine = Machine::this();
     let mut records = Records::open(&args.out, args.fresh)?;
     let mut plan: Vec<(Station, Vec<Cell>)> = Vec::new();

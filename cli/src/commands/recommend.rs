@@ -14,7 +14,7 @@ use crate::recommend::features::Features;
 use crate::recommend::model::{Expected, Model};
 use crate::recommend::preview::{Preview, Tried};
 use crate::scene_source;
-use crate::techniques::{find, with_seed};
+use crate::techniques::{find, label, with_seed};
 
 /// A contender that was tried.
 #[derive(Debug, Serialize)]
@@ -108,8 +108,7 @@ fn tried(
 
 impl Candidate {
     fn name(&self) -> String {
-        let preset = self.preset.as_ref().map_or(String::new(), |preset| format!("@{preset}"));
-        format!("{}{preset} {}", self.technique, self.variant)
+        label(&self.technique, self.preset.as_deref(), &self.variant)
     }
 }
 

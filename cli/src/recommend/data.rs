@@ -10,6 +10,7 @@ use super::preview::Tried;
 use crate::bench::front::{Error, Place, RAYS, Time, by_scene, pareto, places};
 use crate::bench::record::Record;
 use crate::error::CliError;
+use crate::techniques::label;
 
 /// The measurements this build comes with.
 const SHIPPED: &str = include_str!("data.csv");
@@ -79,8 +80,7 @@ impl Line {
 
     /// Name, preset and variant.
     pub(crate) fn label(&self) -> String {
-        let preset = self.preset.as_ref().map_or(String::new(), |preset| format!("@{preset}"));
-        format!("{}{preset} {}", self.technique, self.variant)
+        label(&self.technique, self.preset.as_deref(), &self.variant)
     }
 
     /// Milliseconds, whole or of a frame while only the camera moves.

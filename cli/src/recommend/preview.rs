@@ -3,7 +3,6 @@
 use std::ops::ControlFlow;
 
 use scene_core::bvh::Bvh;
-use scene_core::light::LightPoint;
 use scene_core::metrics;
 use scene_core::raster::render_gbuffer;
 use scene_core::reference::{ReferenceSettings, reference, valid_pixels};
@@ -67,7 +66,7 @@ impl Preview {
             std_error: traced.std_error,
             valid: valid_pixels(&gbuffer, light),
         };
-        let hard = trace(&middle(light))?.visibility;
+        let hard = trace(&light.reduced_to(light.center()))?.visibility;
         let seen = gbuffer.pixel_count() - truth.visibility.values.iter().filter(|v| v.is_nan()).count();
         let features = Features::new(scene.caster_count(), seen, &hard, &truth, pixels_a_pixel)?;
         Ok(Self { view, gbuffer, truth, features, pixels_a_pixel })
@@ -92,17 +91,6 @@ impl Preview {
             survives_camera: run.report.survives_camera,
             rmse: errors.rmse,
         }))
-    }
-}
-
-/// The light as its middle alone.
-fn middle(light: &Light) -> Light {
-    match (light, light.center()) {
-        (Light::Spot { .. }, _) => *light,
-        (_, LightPoint::At(position)) => Light::Point { position },
-        (_, LightPoint::Towards(direction)) => {
-            Light::Directional { direction: -direction, angular_radius: 0.0 }
-        }
     }
 }
 
