@@ -26,8 +26,8 @@ pub const TILE: usize = 8;
 /// Tiles of a run.
 const RUN: usize = 8;
 
-/// Edges of a tile for each sample of the light above which its pixels are traced: to ask whether a receiver is in a wedge
-/// takes some 3 ns and to count an edge some 60, a ray of a packet 30.
+/// Edges of a tile for each sample of the light above which its pixels are traced. It decides about time alone; the number is an
+/// estimate that no measurement has settled yet.
 pub const EDGES_A_RAY: usize = 2;
 
 /// What answers for a receiver.
