@@ -110,9 +110,7 @@ impl PreparedContactHardening<'_> {
         visibility: &mut VisibilityImage,
     ) -> Result<Report, TechniqueError> {
         let pixels = gbuffer.pixel_count();
-        if visibility.values.len() != pixels {
-            return Err(TechniqueError::OutputSize { expected: pixels, got: visibility.values.len() });
-        }
+        TechniqueError::check_output(pixels, visibility.values.len())?;
         let mut report = Report::default();
         if pixels == 0 {
             return Ok(report);

@@ -26,13 +26,7 @@ impl ShadowTechnique for ContactHardening {
             Capability::DirectionalLight | Capability::PointLight | Capability::SpotLight => Support::Exact,
             Capability::Sun | Capability::SphereLight | Capability::RectLight | Capability::DiskLight => SEEN,
         };
-        Description {
-            summary: SUMMARY,
-            support: Capability::ALL
-                .into_iter()
-                .map(|capability| (capability, support(capability)))
-                .collect(),
-        }
+        Description::new(SUMMARY, support)
     }
 
     fn settings(&self) -> serde_json::Value {

@@ -74,17 +74,12 @@ impl GpuShadowTechnique for PdsmOnGpu {
 
 impl PreparedShadow for PreparedPdsm<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError> {
-        if visibility.values.len() != gbuffer.pixel_count() {
-            let (expected, got) = (gbuffer.pixel_count(), visibility.values.len());
-            return Err(TechniqueError::OutputSize { expected, got });
-        }
+        TechniqueError::check_output(gbuffer.pixel_count(), visibility.values.len())?;
         Ok(PreparedPdsm::shade(self, gbuffer, visibility))
     }
 
     fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Result<Report, TechniqueError> {
-        if points.len() != visibility.len() {
-            return Err(TechniqueError::OutputSize { expected: points.len(), got: visibility.len() });
-        }
+        TechniqueError::check_output(points.len(), visibility.len())?;
         if self.params.only_surfaces {
             return Err(TechniqueError::Unsupported {
                 technique: PdsmParams::TECHNIQUE,
@@ -152,10 +147,7 @@ fn describe(params: &PdsmParams) -> Description {
         Capability::Gpu if !cfg!(feature = "gpu") => Support::Unsupported("built without the feature 'gpu'"),
         Capability::Gpu => Support::Exact,
     };
-    Description {
-        summary: SUMMARY,
-        support: Capability::ALL.map(|capability| (capability, support(capability))).to_vec(),
-    }
+    Description::new(SUMMARY, support)
 }
 
 const SUMMARY: &str =

@@ -32,13 +32,7 @@ impl ShadowTechnique for PenumbraWedges {
             Capability::TriangleSoup | Capability::FreePoints => soft,
             Capability::Gpu => Support::Unsupported("the CPU path is the only one so far"),
         };
-        Description {
-            summary: SUMMARY,
-            support: Capability::ALL
-                .into_iter()
-                .map(|capability| (capability, support(capability)))
-                .collect(),
-        }
+        Description::new(SUMMARY, support)
     }
 
     fn settings(&self) -> serde_json::Value {
@@ -68,17 +62,12 @@ impl ShadowTechnique for PenumbraWedges {
 
 impl PreparedShadow for PreparedWedges<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError> {
-        if visibility.values.len() != gbuffer.pixel_count() {
-            let (expected, got) = (gbuffer.pixel_count(), visibility.values.len());
-            return Err(TechniqueError::OutputSize { expected, got });
-        }
+        TechniqueError::check_output(gbuffer.pixel_count(), visibility.values.len())?;
         Ok(PreparedWedges::shade(self, gbuffer, visibility))
     }
 
     fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Result<Report, TechniqueError> {
-        if points.len() != visibility.len() {
-            return Err(TechniqueError::OutputSize { expected: points.len(), got: visibility.len() });
-        }
+        TechniqueError::check_output(points.len(), visibility.len())?;
         Ok(PreparedWedges::visibility_at(self, points, visibility))
     }
 

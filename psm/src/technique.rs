@@ -42,13 +42,7 @@ impl ShadowTechnique for Psm {
             }
             Capability::Gpu => Support::Exact,
         };
-        Description {
-            summary: SUMMARY,
-            support: Capability::ALL
-                .into_iter()
-                .map(|capability| (capability, support(capability)))
-                .collect(),
-        }
+        Description::new(SUMMARY, support)
     }
 
     fn settings(&self) -> serde_json::Value {
@@ -113,10 +107,7 @@ struct ForAnyFrame<'a> {
 
 impl PreparedShadow for ForAnyFrame<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError> {
-        if visibility.values.len() != gbuffer.pixel_count() {
-            let (expected, got) = (gbuffer.pixel_count(), visibility.values.len());
-            return Err(TechniqueError::OutputSize { expected, got });
-        }
+        TechniqueError::check_output(gbuffer.pixel_count(), visibility.values.len())?;
         let ShadowQuery { scene, light, camera } = self.query;
         let (prepared, mut report) = self.technique.prepare_with(&self.clouds, scene, light, camera, gbuffer);
         report.merge(&prepared.shade(gbuffer, visibility));
@@ -124,9 +115,7 @@ impl PreparedShadow for ForAnyFrame<'_> {
     }
 
     fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Result<Report, TechniqueError> {
-        if points.len() != visibility.len() {
-            return Err(TechniqueError::OutputSize { expected: points.len(), got: visibility.len() });
-        }
+        TechniqueError::check_output(points.len(), visibility.len())?;
         let ShadowQuery { scene, light, camera } = self.query;
         let mut report = Report::default();
         let prepared = self.free.get_or_init(|| {

@@ -63,17 +63,6 @@ pub fn weight(light: &Light, point: LightPoint, receiver: Vec3) -> f32 {
     (normal.dot(to_receiver) * radius * radius / (length * length * length)).max(0.0)
 }
 
-/// `point` as a light of its own.
-pub fn as_light(light: &Light, point: LightPoint) -> Light {
-    match (light, point) {
-        (Light::Spot { .. }, _) => *light,
-        (_, LightPoint::At(position)) => Light::Point { position },
-        (_, LightPoint::Towards(direction)) => {
-            Light::Directional { direction: -direction, angular_radius: 0.0 }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -17,7 +17,7 @@ use scene_core::{GBuffer, Light, Report, Scene, VisibilityImage};
 
 use crate::cpu;
 use crate::light_maps::{LightMaps, ShadowMapView};
-use crate::light_points::{as_light, light_points, weight};
+use crate::light_points::{light_points, weight};
 use crate::light_views::light_views;
 use crate::receiver_plane::plane_tolerance;
 use crate::view_casters::looked_up_behind;
@@ -78,7 +78,7 @@ impl<'a> MultiView<'a> {
         let mut scratch = RasterScratch::new();
         let mut maps: Vec<ShadowMapView> = Vec::new();
         for point in points {
-            let light = as_light(&self.light, point);
+            let light = self.light.reduced_to(point);
             // Of a sphere, points on the far side count for nobody: the height above them is largest at a corner.
             let unseen = |corner: Vec3| weight(&self.light, point, corner) <= 0.0;
             if self.params.skip && bounds.corners().into_iter().all(unseen) {

@@ -52,13 +52,7 @@ impl ShadowTechnique for ShadowMap {
             }
             Capability::Gpu => Support::Exact,
         };
-        Description {
-            summary: SUMMARY,
-            support: Capability::ALL
-                .into_iter()
-                .map(|capability| (capability, support(capability)))
-                .collect(),
-        }
+        Description::new(SUMMARY, support)
     }
 
     fn settings(&self) -> serde_json::Value {
@@ -117,17 +111,12 @@ impl GpuShadowTechnique for ShadowMapOnGpu {
 
 impl PreparedShadow for PreparedShadowMap<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError> {
-        if visibility.values.len() != gbuffer.pixel_count() {
-            let (expected, got) = (gbuffer.pixel_count(), visibility.values.len());
-            return Err(TechniqueError::OutputSize { expected, got });
-        }
+        TechniqueError::check_output(gbuffer.pixel_count(), visibility.values.len())?;
         Ok(PreparedShadowMap::shade(self, gbuffer, visibility))
     }
 
     fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Result<Report, TechniqueError> {
-        if points.len() != visibility.len() {
-            return Err(TechniqueError::OutputSize { expected: points.len(), got: visibility.len() });
-        }
+        TechniqueError::check_output(points.len(), visibility.len())?;
         Ok(PreparedShadowMap::visibility_at(self, points, visibility))
     }
 

@@ -147,10 +147,7 @@ pub(crate) fn near_box(camera: &Camera) -> Aabb {
 ///
 /// The pyramid is taken with the box around eye and near rectangle.
 pub fn near_casters(casters: &Casters<'_>, light: &Light, camera: &Camera) -> Vec<u32> {
-    let center = match light.center() {
-        LightPoint::At(position) => Light::Point { position },
-        LightPoint::Towards(towards) => Light::Directional { direction: -towards, angular_radius: 0.0 },
-    };
+    let center = light.center().as_light();
     let receivers = Receivers::within(casters.scene, &[near_box(camera)], &center);
     let region = CasterRegion::between(casters.scene, &receivers, &center);
     let near = relevant_casters(casters.scene, &region, &casters.chunks, |_| true).ranges;

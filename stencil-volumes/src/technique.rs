@@ -37,13 +37,7 @@ impl ShadowTechnique for StencilVolumes {
             }
             Capability::Gpu => Support::Exact,
         };
-        Description {
-            summary: SUMMARY,
-            support: Capability::ALL
-                .into_iter()
-                .map(|capability| (capability, support(capability)))
-                .collect(),
-        }
+        Description::new(SUMMARY, support)
     }
 
     fn settings(&self) -> serde_json::Value {
@@ -99,17 +93,12 @@ impl GpuShadowTechnique for StencilVolumesOnGpu {
 
 impl PreparedShadow for PreparedVolumes<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError> {
-        if visibility.values.len() != gbuffer.pixel_count() {
-            let (expected, got) = (gbuffer.pixel_count(), visibility.values.len());
-            return Err(TechniqueError::OutputSize { expected, got });
-        }
+        TechniqueError::check_output(gbuffer.pixel_count(), visibility.values.len())?;
         Ok(PreparedVolumes::shade(self, gbuffer, visibility))
     }
 
     fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Result<Report, TechniqueError> {
-        if points.len() != visibility.len() {
-            return Err(TechniqueError::OutputSize { expected: points.len(), got: visibility.len() });
-        }
+        TechniqueError::check_output(points.len(), visibility.len())?;
         Ok(PreparedVolumes::visibility_at(self, points, visibility))
     }
 

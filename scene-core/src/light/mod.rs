@@ -124,9 +124,22 @@ impl LightPoint {
             Self::Towards(direction) => (direction, f32::INFINITY),
         }
     }
+
+    /// The point as a light of its own, which shines everywhere.
+    pub fn as_light(self) -> Light {
+        match self {
+            Self::At(position) => Light::Point { position },
+            Self::Towards(direction) => Light::Directional { direction: -direction, angular_radius: 0.0 },
+        }
+    }
 }
 
 impl Light {
+    /// The light as one of its points, without extent; a spot keeps its cone.
+    pub fn reduced_to(&self, point: LightPoint) -> Self {
+        if let Self::Spot { .. } = self { *self } else { point.as_light() }
+    }
+
     /// The kind's name, as in a scene file.
     pub fn kind(&self) -> &'static str {
         match self {

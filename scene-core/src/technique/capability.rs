@@ -91,6 +91,14 @@ pub struct Description {
 }
 
 impl Description {
+    /// What `support` says of every capability.
+    pub fn new(summary: &'static str, support: impl Fn(Capability) -> Support) -> Self {
+        Self {
+            summary,
+            support: Capability::ALL.map(|capability| (capability, support(capability))).to_vec(),
+        }
+    }
+
     /// How `capability` is served; one that is not listed is unsupported.
     pub fn support(&self, capability: Capability) -> Support {
         self.support

@@ -55,6 +55,16 @@ pub enum TechniqueError {
     Other(#[from] Box<dyn std::error::Error + Send + Sync>),
 }
 
+impl TechniqueError {
+    /// Refuses an output of `got` values for an input of `expected`.
+    ///
+    /// # Errors
+    /// [`TechniqueError::OutputSize`] if the two differ.
+    pub fn check_output(expected: usize, got: usize) -> Result<(), Self> {
+        if got == expected { Ok(()) } else { Err(Self::OutputSize { expected, got }) }
+    }
+}
+
 /// What a technique prepares for: one light in one scene, seen by one camera.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadowQuery<'a> {

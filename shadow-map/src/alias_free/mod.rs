@@ -192,12 +192,7 @@ impl<'a> AliasFree<'a> {
             .par_chunks(BOX)
             .map(|part| Aabb::from_points(part.iter().copied().filter(|origin| origin.is_finite())))
             .collect();
-        let light = match light {
-            LightPoint::At(position) => Light::Point { position },
-            LightPoint::Towards(direction) => {
-                Light::Directional { direction: -direction, angular_radius: 0.0 }
-            }
-        };
+        let light = light.as_light();
         let region = CasterRegion::of_receivers(scene, &boxes, &light);
         let kept = relevance::relevant_casters(scene, &region, &self.chunks, |_| true);
         kept.book(report);
