@@ -99,7 +99,9 @@ impl<'a> Stand<'a> {
         }
     }
 
-    /// One run on the CPU.
+    /// One run on the CPU. Never inlined: instructions are counted between its ends (`cargo xtask instructions`), which the
+    /// optimiser would else take away.
+    #[inline(never)]
     fn on_cpu(&self, technique: &dyn ShadowTechnique) -> Result<Run, CliError> {
         let (view, gbuffer) = (self.view, self.gbuffer);
         let query = ShadowQuery { scene: &view.setup.scene, light: view.light(), camera: &view.setup.camera };
