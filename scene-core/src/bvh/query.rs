@@ -118,9 +118,14 @@ impl Bvh {
         if !Shaft::can_reach(origin, self.tree.bounds) {
             return self.occluded_slowly(origin, ends, mask, finite);
         }
+        // No closure around the walk: it would be compiled apart, without the vector unit.
         let blocked = dispatch!(self.level, simd => {
-            Shaft::new(simd, origin, ends, mask, finite)
-                .map(|(shaft, rays)| walk::occluded(simd, &self.tree, self.masks.as_ref(), &shaft, &rays))
+            match Shaft::new(simd, origin, ends, mask, finite) {
+                Some((shaft, rays)) => {
+                    Some(walk::occluded(simd, &self.tree, self.masks.as_ref(), &shaft, &rays))
+                }
+                None => None,
+            }
         });
         if let Some(blocked) = blocked {
             return blocked;
