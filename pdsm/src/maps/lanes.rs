@@ -52,12 +52,15 @@ impl<S: Simd> Moves<S> {
     /// Where a vertex is snapped to in each view.
     #[inline(always)]
     fn place(&self, vertex: &Vertex) -> [i32x16<S>; 2] {
-        let place = |step: f32x16<S>, whole: i32, rest: f32| {
-            let bits: i32x16<S> = (step * vertex.t + rest + SHIFT).bitcast();
-            bits + (whole - SHIFT.to_bits() as i32)
-        };
-        [place(self.x, vertex.whole[0], vertex.rest[0]), place(self.y, vertex.whole[1], vertex.rest[1])]
+        [place(self.x, vertex, 0), place(self.y, vertex, 1)]
     }
+}
+
+/// A vertex along one axis, moved by a step for each view. No closure: it would be compiled apart, without the vector unit.
+#[inline(always)]
+fn place<S: Simd>(step: f32x16<S>, vertex: &Vertex, axis: usize) -> i32x16<S> {
+    let bits: i32x16<S> = (step * vertex.t + vertex.rest[axis] + SHIFT).bitcast();
+    bits + (vertex.whole[axis] - SHIFT.to_bits() as i32)
 }
 
 #[inline(always)]

@@ -216,18 +216,25 @@ impl<'a> AliasFree<'a> {
         let mask = scene.objects()[piece.object as usize].alpha.as_deref();
         for triangle in piece.triangles.clone() {
             let corners = scene.corners(triangle);
-            caster::seen(frame, corners, |caster| {
-                receivers.shadow(simd, &caster, mask.is_some(), &mut tally, |id| {
-                    let origin = origins[id as usize];
-                    match mask {
-                        None => blocks(corners, origin, light),
-                        Some(mask) => {
-                            let uvs = scene.triangles()[triangle].map(|vertex| scene.uvs()[vertex as usize]);
-                            blocks_cut_out(corners, uvs, mask, origin, light)
+            // Inlined into here, or it would not use the vector unit.
+            caster::seen(
+                frame,
+                corners,
+                #[inline(always)]
+                |caster| {
+                    receivers.shadow(simd, &caster, mask.is_some(), &mut tally, |id| {
+                        let origin = origins[id as usize];
+                        match mask {
+                            None => blocks(corners, origin, light),
+                            Some(mask) => {
+                                let uvs =
+                                    scene.triangles()[triangle].map(|vertex| scene.uvs()[vertex as usize]);
+                                blocks_cut_out(corners, uvs, mask, origin, light)
+                            }
                         }
-                    }
-                });
-            });
+                    });
+                },
+            );
         }
         tally
     }
