@@ -40,7 +40,8 @@ pub struct VolumeParams {
     /// From where faces are counted; of no meaning for `planar`.
     pub count: Count,
     /// Trace a shadow ray for each pixel of a tile where more than [`crate::volumes::DENSE`] sides would have to be
-    /// counted, which costs more; no pixel changes. Off only to measure. On the CPU alone.
+    /// counted, which costs more, and for all pixels if there are more silhouette edges than [`crate::volumes::most_edges`]; no
+    /// pixel changes. Off only to measure.
     pub rays: bool,
     /// Leave out what cannot change the image: casters outside the region that matters or in another's shadow. On the CPU
     /// alone: on the GPU the blocks of the image leave out what does not reach them, and nothing else is asked.

@@ -60,6 +60,12 @@ pub struct Volumes {
 /// Sides a tile above which its pixels are traced: to count a side at 64 pixels takes some 100 ns, a ray 150.
 pub const DENSE: u32 = 96;
 
+/// Silhouette edges above which all pixels are traced. Each block of 64² pixels starts with a count of all sides, a few
+/// nanoseconds each: with more sides than an eighth of the pixels that alone is longer than a ray a pixel.
+pub fn most_edges(camera: &Camera) -> usize {
+    camera.pixel_count() / 8
+}
+
 impl Volumes {
     /// The volumes of `light` for `camera`.
     pub fn new(
@@ -91,9 +97,7 @@ impl Volumes {
         });
         let homogeneous = HomogeneousLight::from(light.center());
         let screen = Screen::new(camera);
-        // Each block of 64² pixels starts with a count of all sides, a few nanoseconds each: with more sides than an
-        // eighth of the pixels that alone is longer than a ray a pixel.
-        let all_dense = rays && edges.len() > camera.pixel_count() / 8;
+        let all_dense = rays && edges.len() > most_edges(camera);
         if all_dense {
             edges = Vec::new();
             from_eye = 0;

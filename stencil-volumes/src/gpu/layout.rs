@@ -33,8 +33,12 @@ pub struct VolumesUniform {
     pub solid_nodes: u32,
     /// Those of both trees.
     pub nodes: u32,
+    /// Sides a tile above which its pixels are traced.
+    pub dense: u32,
+    /// Edges above which all pixels are.
+    pub most_edges: u32,
     /// Zero.
-    pub padding: u32,
+    pub padding: [u32; 3],
 }
 
 /// `Projection` of `planar.wesl`.
@@ -82,7 +86,9 @@ mod tests {
                 edges,
                 capacity,
                 solid_nodes,
-                nodes
+                nodes,
+                dense,
+                most_edges
             ]
         );
         assert_layout!(

@@ -27,7 +27,7 @@
 //!
 //! # Exactness
 //! V differs from one exact shadow ray a pixel only where the position, kept as a distance in f32, is rounded to the other
-//! side of an outline. Facing and the eye's side of each edge are decided to 44 bits (`predicates.wesl`).
+//! side of an outline. Facing and the eye's side of each edge are decided to 41 bits (`predicates.wesl`).
 
 pub mod layout;
 pub mod planar;

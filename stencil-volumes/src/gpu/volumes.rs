@@ -15,6 +15,7 @@ use super::shaders;
 use super::tables::{Tables, TablesError};
 use crate::casters::near_box;
 use crate::cpu::{BLOCK, TILE};
+use crate::volumes::{DENSE, most_edges};
 use crate::{Count, VolumeParams};
 
 /// Bytes that the lists of edges of all blocks may take together. A block that has no room for its edges tells its
@@ -23,6 +24,11 @@ const LISTS: u64 = 64 << 20;
 
 /// Words of `counters`.
 const COUNTERS: u64 = 256;
+
+/// Edges that are counted at most, also if `rays` is off: 64 invocations go through them together. Drivers end a dispatch that
+/// takes too long, and Mesa's software ones all loops of an invocation after 65,535 rounds in sum; here are 2¹⁴ over edges and
+/// as many over sides.
+const MOST_EDGES: u32 = 64 << 14;
 
 /// A compute pass with its group 0.
 #[derive(Debug)]
@@ -213,7 +219,7 @@ impl VolumesOnGpu {
     }
 
     fn uniform(&self, tables: &Tables, query: &GpuShadowQuery<'_>, device: &wgpu::Device) -> VolumesUniform {
-        let camera = query.camera;
+        let (camera, rays) = (query.camera, self.params.rays);
         let near = near_box(camera);
         let light_point = match query.light.center() {
             LightPoint::At(place) => place.extend(1.0),
@@ -238,6 +244,8 @@ impl VolumesOnGpu {
             capacity: u64::from(tables.edges).min(room.saturating_sub(2)) as u32,
             solid_nodes: tables.solid_nodes,
             nodes: tables.all_nodes,
+            dense: if rays { DENSE } else { MOST_EDGES / 64 },
+            most_edges: MOST_EDGES.min(if rays { most_edges(camera) as u32 } else { u32::MAX }),
             ..VolumesUniform::zeroed()
         }
     }
@@ -319,6 +327,15 @@ impl VolumesOnGpu {
     /// If the device has no room for it.
     pub fn counters(&mut self, device: &wgpu::Device) -> Result<wgpu::Buffer, TechniqueError> {
         Ok(self.counters.get(device, 4 * COUNTERS)?)
+    }
+
+    /// The buffer of facings of the last frame, an `i32` a triangle. For tests.
+    ///
+    /// # Errors
+    /// If the device has no room for it.
+    pub fn facings(&mut self, device: &wgpu::Device) -> Result<wgpu::Buffer, TechniqueError> {
+        let triangles = self.tables.as_ref().map_or(0, |tables| tables.triangles);
+        Ok(self.facing.get(device, 4 * u64::from(triangles))?)
     }
 
     /// The buffer of pixels of the last frame: word 0 says how many of them a ray decided. For tests and benchmarks.
