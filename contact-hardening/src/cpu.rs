@@ -46,7 +46,7 @@ pub fn filter(physical: &Physical<'_>, visibility: &mut VisibilityImage, report:
     let mut roles = vec![Role::Apart; visibility.values.len()];
     let rows = visibility.values.par_chunks_mut(width).zip(roles.par_chunks_mut(width)).enumerate();
     let answer_row = |(row, (values, roles)): (usize, (&mut [f32], &mut [Role]))| {
-        let (mut lit, mut umbra) = (0u64, 0u64);
+        let (mut lit, mut umbra, mut clear) = (0u64, 0u64, 0u64);
         for (column, (value, role)) in values.iter_mut().zip(roles).enumerate() {
             match surroundings(physical, physical.gbuffer, row * width + column) {
                 Surroundings::Known => {}
@@ -58,26 +58,33 @@ pub fn filter(physical: &Physical<'_>, visibility: &mut VisibilityImage, report:
                     umbra += 1;
                     *role = Role::Certain;
                 }
-                Surroundings::Penumbra(site) => (*value, *role) = answer(physical, &site, *value),
+                Surroundings::Penumbra(site) => {
+                    (*value, *role) = answer(physical, &site, *value, &mut clear);
+                }
             }
         }
-        (lit, umbra)
+        [lit, umbra, clear]
     };
-    let (lit, umbra) = rows.map(answer_row).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    let add = |a: [u64; 3], b: [u64; 3]| std::array::from_fn(|i| a[i] + b[i]);
+    let [lit, umbra, clear] = rows.map(answer_row).reduce(|| [0; 3], add);
     report.skip("lit pixels", lit);
     report.skip("umbra pixels", umbra);
+    report.skip("searches of the map", clear);
     if physical.params.smooth && roles.par_iter().any(|role| matches!(role, Role::Wide(_))) {
         report.time("shade.smooth", |_| smooth(physical.gbuffer, &roles, visibility));
     }
 }
 
 /// V of a pixel whose hard V is `hard`, and how it takes part in the averages.
-fn answer(physical: &Physical<'_>, site: &Site, hard: f32) -> (f32, Role) {
-    let blockers = physical.search(site);
+fn answer(physical: &Physical<'_>, site: &Site, hard: f32, clear: &mut u64) -> (f32, Role) {
+    let lines = physical.look_ups.lines(&site.receiver, &site.cone);
+    let blockers = physical.search(site, &lines, clear);
     match blockers.mean() {
         // What the pyramid proves stands.
-        Some(mean) if site.is_umbra() => (physical.filter(site, &blockers, mean), Role::Certain),
-        Some(mean) => (physical.filter(site, &blockers, mean), role(physical, site, &blockers)),
+        Some(_) if site.is_umbra() => (0.0, Role::Certain),
+        Some(mean) => {
+            (physical.filter(site, &lines, &blockers, mean, clear), role(physical, site, &blockers))
+        }
         None => (hard, if hard == 1.0 { Role::Certain } else { Role::Apart }),
     }
 }

@@ -1,9 +1,10 @@
 //! The points of pass 4's kernel, and what each weighs.
 
 use glam::Vec2;
+use scene_core::Light;
 use scene_core::light::sampling::{SampleKey, sobol};
 
-use crate::params::Variant;
+use crate::params::{ContactHardeningParams, Scaling, Variant};
 
 /// Candidates a point: twice as many raise the least distance by a few percent.
 const CANDIDATES: u32 = 32;
@@ -19,6 +20,19 @@ pub struct Kernel {
     pub reach: f32,
     /// Whether a pixel shifts the points (within a square) instead of turning them.
     pub is_square: bool,
+}
+
+impl ContactHardeningParams {
+    /// The kernel that these settings blur with under a light.
+    pub fn kernel_for(&self, light: &Light) -> Kernel {
+        match self.scaling {
+            Scaling::Physical => {
+                let is_round = !matches!(light, Light::Rect { .. });
+                Kernel::of_light(self.variant, is_round, self.taps, self.seed)
+            }
+            Scaling::Paper => Kernel::gaussian(self.taps, self.seed),
+        }
+    }
 }
 
 impl Kernel {
@@ -99,19 +113,25 @@ fn wrap(at: f32) -> f32 {
 }
 
 /// Points of the unit disk far from each other, the first at the origin: each next one is the farthest from those before
-/// it of a few random candidates (Mitchell 1991), so any prefix is well spread.
+/// it of a few random candidates (Mitchell 1991), so any prefix is well spread. They come in opposite pairs: an odd number
+/// of them has its mean at the origin, and a blur by it moves no shadow aside.
 pub fn poisson_points(count: u32, seed: u32) -> Vec<Vec2> {
     let key = SampleKey::new(u64::from(seed), 1);
     let mut points = vec![Vec2::ZERO];
     for index in 1..count {
+        if index % 2 == 0 {
+            points.push(-points[points.len() - 1]);
+            continue;
+        }
         let candidate = |number: u32| {
             let square = key.square(index * CANDIDATES + number);
             Vec2::from_angle(square.x * std::f32::consts::TAU) * square.y.sqrt()
         };
-        // The border counts as a neighbour half a gap away, or points would crowd on it.
+        // The border counts as a neighbour half a gap away, or points would crowd on it; so does the opposite point.
         let gap = |point: &Vec2| {
-            let border = 2.0 * (1.0 - point.length());
-            points.iter().map(|other| other.distance(*point)).fold(border, f32::min)
+            let length = point.length();
+            let own = (2.0 * (1.0 - length)).min(2.0 * length);
+            points.iter().map(|other| other.distance(*point)).fold(own, f32::min)
         };
         let best = (0..CANDIDATES).map(candidate).max_by(|a, b| gap(a).total_cmp(&gap(b)));
         points.extend(best);
@@ -145,6 +165,7 @@ mod tests {
         let nearest = (0..64)
             .flat_map(|i| points[..i].iter().map(|b| b.distance(points[i])).collect::<Vec<_>>())
             .fold(f32::INFINITY, f32::min);
+        assert!(points[..63].iter().sum::<Vec2>().length() < 1e-5);
         // A square grid of 64 points in the disk has gaps of 0.22.
         assert!(nearest > 0.22 / 3.0, "{nearest}");
     }

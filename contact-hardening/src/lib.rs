@@ -3,25 +3,31 @@
 pub mod cpu;
 pub mod distance_map;
 pub mod footprint;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod kernel;
+pub mod look_up;
 pub mod multi_pass;
 pub mod paper;
 mod params;
 pub mod physical;
 pub mod shadow_pyramid;
+mod show;
 pub mod smoothing;
 mod technique;
 
 use std::sync::Arc;
 
+use gnomon_shadow_map::filter_maps::FilterMaps;
 use gnomon_shadow_map::light_maps::LightMaps;
 use gnomon_shadow_map::{ShadowMapParams, Variant as MapVariant};
 use scene_core::technique::{PreparedShadow, ShadowQuery, ShadowTechnique, TechniqueError};
-use scene_core::{Camera, GBuffer, Light, Report, VisibilityImage};
+use scene_core::{Camera, GBuffer, Report, VisibilityImage};
 
 use kernel::Kernel;
+use look_up::LookUps;
 use paper::Paper;
-pub use params::{Blocker, ContactHardeningParams, Scaling, Variant};
+pub use params::{Blocker, ContactHardeningParams, GaussianKernel, Scaling, Show, Variant};
 use physical::Physical;
 use shadow_pyramid::ShadowPyramid;
 pub use technique::Factory;
@@ -30,13 +36,20 @@ pub use technique::Factory;
 #[derive(Clone, Default)]
 pub struct ContactHardening {
     params: ContactHardeningParams,
-    source: Option<Arc<dyn ShadowTechnique>>,
+    source: Option<Source>,
+}
+
+/// Where hard shadows come from, if not from the own map.
+#[derive(Clone)]
+struct Source {
+    name: String,
+    technique: Arc<dyn ShadowTechnique>,
 }
 
 /// A light, prepared; holds for any camera if the source does.
 pub struct PreparedContactHardening<'a> {
     params: ContactHardeningParams,
-    maps: LightMaps<'a>,
+    look_ups: LookUps<'a>,
     kernel: Kernel,
     source: Option<Box<dyn PreparedShadow + 'a>>,
 }
@@ -48,10 +61,15 @@ impl ContactHardening {
     }
 
     /// The same on top of any other technique's hard shadows; V below one half counts as shadowed. Blockers are still
-    /// found in the own map, which no technique has to hold.
+    /// found in the own map, which no technique has to hold. Reports call the source `name`.
     #[must_use]
-    pub fn on_top_of(self, source: Arc<dyn ShadowTechnique>) -> Self {
-        Self { source: Some(source), ..self }
+    pub fn on_top_of(self, name: impl Into<String>, source: Arc<dyn ShadowTechnique>) -> Self {
+        Self { source: Some(Source { name: name.into(), technique: source }), ..self }
+    }
+
+    /// What reports call the source of hard shadows: `own` for the own map.
+    pub fn source_name(&self) -> &str {
+        self.source.as_ref().map_or("own", |source| &source.name)
     }
 
     /// Pass 1: draws the map, and prepares the source.
@@ -62,18 +80,39 @@ impl ContactHardening {
         &self,
         query: &ShadowQuery<'a>,
     ) -> Result<(PreparedContactHardening<'a>, Report), TechniqueError> {
-        let params = self.params;
         let mut report = Report::default();
         let settings = ShadowMapParams {
             variant: MapVariant::Pcf,
-            map_size: params.map_size,
-            skip: params.skip,
+            map_size: self.params.map_size,
+            skip: self.params.skip,
             ..Default::default()
         };
         let maps = LightMaps::draw(query.scene, query.light, &settings, &mut report, |_, _, _| None);
+        let (prepared, rest) = self.prepare_with(maps, query)?;
+        let bytes = report.bytes + rest.bytes;
+        report.merge(&rest);
+        report.bytes = bytes;
+        Ok((prepared, report))
+    }
+
+    /// The same with maps of the query's light that are drawn already, for whatever technique; their size and not
+    /// `map_size` counts.
+    ///
+    /// # Errors
+    /// Those of the source.
+    pub fn prepare_with<'a>(
+        &self,
+        maps: LightMaps<'a>,
+        query: &ShadowQuery<'a>,
+    ) -> Result<(PreparedContactHardening<'a>, Report), TechniqueError> {
+        let params = self.params;
+        let mut report = Report::default();
+        let filter = FilterMaps::new(maps, params.skip, &mut report);
+        let look_ups = report.time("prepare.tiles", |_| LookUps::new(filter));
+        report.bytes += look_ups.bytes();
         let source = match &self.source {
             Some(source) => {
-                let (prepared, rest) = source.prepare(query)?;
+                let (prepared, rest) = source.technique.prepare(query)?;
                 let bytes = report.bytes;
                 report.merge(&rest);
                 report.bytes = bytes + rest.bytes;
@@ -81,14 +120,8 @@ impl ContactHardening {
             }
             None => None,
         };
-        let kernel = match params.scaling {
-            Scaling::Physical => {
-                let is_round = !matches!(query.light, Light::Rect { .. });
-                Kernel::of_light(params.variant, is_round, params.taps, params.seed)
-            }
-            Scaling::Paper => Kernel::gaussian(params.taps, params.seed),
-        };
-        Ok((PreparedContactHardening { params, maps, kernel, source }, report))
+        let kernel = params.kernel_for(query.light);
+        Ok((PreparedContactHardening { params, look_ups, kernel, source }, report))
     }
 }
 
@@ -124,14 +157,19 @@ impl PreparedContactHardening<'_> {
             None => None,
         };
         let mut map = report.time("shade.distance", |_| {
-            distance_map::distance_map(&self.maps, gbuffer, hard.as_ref(), visibility)
+            distance_map::distance_map(self.look_ups.maps(), gbuffer, hard.as_ref(), visibility)
         });
+        if self.params.show == Show::Distance {
+            show::distance(&map, visibility);
+            return Ok(report);
+        }
         match self.params.scaling {
             Scaling::Physical => {
                 let pyramid = report.time("shade.pyramid", |_| ShadowPyramid::new(&map));
                 let physical = Physical {
                     params: &self.params,
-                    maps: &self.maps,
+                    maps: self.look_ups.maps(),
+                    look_ups: &self.look_ups,
                     gbuffer,
                     distance: &map,
                     pyramid: &pyramid,
@@ -142,9 +180,12 @@ impl PreparedContactHardening<'_> {
             }
             Scaling::Paper => report.time("shade.filter", |report| {
                 let paper = Paper { params: &self.params, gbuffer, kernel: &self.kernel };
-                paper.scale(&self.maps.light, &mut map);
+                paper.scale(&self.look_ups.maps().light, &mut map);
                 cpu::filter_as_published(&paper, &mut map, visibility, report);
             }),
+        }
+        if self.params.show == Show::Penumbra {
+            show::penumbra(visibility);
         }
         Ok(report)
     }

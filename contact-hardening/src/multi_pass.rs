@@ -3,6 +3,10 @@
 //! A pixel takes as many passes as its footprint is pixels wide in radius, up to `passes`; variances add up, so each of
 //! n passes has a kernel 1/√n as wide as the whole. Pixels that are done are left alone and keep answering for others.
 //! A pixel is left out of a pass if all that the pass can reach is equal: it would get that value.
+//!
+//! Passes ask pixels, each of which is lit or shadowed as a whole. With `fill`, a footprint narrower than the kernel's
+//! points are many takes no passes: the map answers at once, as for `gaussian`, and shadows thinner than pixels stay. To
+//! others such a pixel answers with the S of pass 2.
 
 use glam::Vec2;
 use rayon::prelude::*;
@@ -20,18 +24,38 @@ struct Active {
     passes: u32,
 }
 
+/// What is to be done with a pixel.
+enum Plan {
+    Blur(Active),
+    /// The pixel, and its S.
+    Known(usize, f32),
+}
+
 /// Blurs S of `physical.distance`, in place of which the result is returned; counts the blurs left out.
 pub fn multi_pass(physical: &Physical<'_>, sites: &[Site]) -> (Vec<f32>, u64) {
     let width = physical.distance.width;
     let plan = |site: &Site| {
-        let t = physical.search(site).mean()?;
+        let lines = physical.look_ups.lines(&site.receiver, &site.cone);
+        let blockers = physical.search(site, &lines, &mut 0);
+        let t = blockers.mean()?;
         let (min, max) = site.footprint.bounds(1.0, t)?;
         let radius = 0.5 * (max - min).max_element();
         let passes = (radius.ceil() as u32).clamp(1, physical.params.passes);
         let [x, y] = site.receiver.pixel.map(|at| at as usize);
-        Some(Active { site: *site, pixel: y * width + x, t, passes })
+        let pixel = y * width + x;
+        if physical.params.fill && physical.is_narrow(site, t) {
+            return Some(Plan::Known(pixel, 1.0 - physical.filter(site, &lines, &blockers, t, &mut 0)));
+        }
+        Some(Plan::Blur(Active { site: *site, pixel, t, passes }))
     };
-    let mut active: Vec<Active> = sites.par_iter().filter_map(plan).collect();
+    let plans: Vec<Plan> = sites.par_iter().filter_map(plan).collect();
+    let (mut active, mut known) = (Vec::new(), Vec::new());
+    for plan in plans {
+        match plan {
+            Plan::Blur(pixel) => active.push(pixel),
+            Plan::Known(pixel, shadow) => known.push((pixel, shadow)),
+        }
+    }
     let mut map = DistanceMap { distance: physical.distance.distance.clone(), ..DistanceMap::default() };
     map.shadow.clone_from(&physical.distance.shadow);
     (map.width, map.height) = (width, physical.distance.height);
@@ -53,6 +77,9 @@ pub fn multi_pass(physical: &Physical<'_>, sites: &[Site]) -> (Vec<f32>, u64) {
         }
         pass += 1;
         active.retain(|active| active.passes > pass);
+    }
+    for (pixel, shadow) in known {
+        map.shadow[pixel] = shadow;
     }
     (map.shadow, skipped)
 }

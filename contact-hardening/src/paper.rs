@@ -9,7 +9,7 @@ use scene_core::{GBuffer, Light};
 
 use crate::distance_map::{DistanceMap, to_light};
 use crate::kernel::Kernel;
-use crate::params::{ContactHardeningParams, Variant};
+use crate::params::{ContactHardeningParams, GaussianKernel, Variant};
 use crate::shadow_pyramid::{PixelRect, ShadowPyramid};
 
 /// What the passes read.
@@ -83,7 +83,7 @@ impl Paper<'_> {
                     if map.distance.iter().all(|&distance| distance <= 0.0) {
                         break;
                     }
-                    let size = self.pass_size(pass);
+                    let size = self.params.pass_size(pass);
                     skipped += self.pass(map, |_| size);
                     map.distance.iter_mut().for_each(|distance| *distance = (*distance - 1.0).max(0.0));
                 }
@@ -92,39 +92,38 @@ impl Paper<'_> {
         }
     }
 
-    /// The kernel's width in a pass of `multi-pass`.
-    fn pass_size(&self, pass: u32) -> f32 {
-        let (most, passes) = (self.params.kernel_size as f32, self.params.passes);
-        let first = most.min(3.0);
-        if self.params.widening && passes > 1 {
-            first + (most - first) * pass as f32 / (passes - 1) as f32
-        } else {
-            most
-        }
-    }
-
     /// One pass over all pixels with D > 0; `size` is the kernel's width in pixels for a D.
     fn pass(&self, map: &mut DistanceMap, size: impl Fn(f32) -> f32 + Sync) -> u64 {
         let pyramid = self.params.skip.then(|| ShadowPyramid::new(map));
         let source = &*map;
+        // Odd widths have a middle: radius 0, 1, 2, …
+        let radius = |distance: f32| (size(distance) * 0.5).floor() as usize;
+        let is_separable =
+            self.params.variant != Variant::Pcf && self.params.kernel == GaussianKernel::Separable;
+        let most = (self.params.kernel_size / 2) as usize;
+        let rows = is_separable.then(|| {
+            let row = |pixel: usize| self.row(source, pixel, radius(source.distance[pixel]));
+            (0..source.shadow.len()).into_par_iter().map(row).collect::<Vec<_>>()
+        });
         let answer = |pixel: usize| {
             let (shadow, distance) = (source.shadow[pixel], source.distance[pixel]);
             if distance <= 0.0 || shadow.is_nan() {
                 return (shadow, 0);
             }
-            // Odd widths have a middle: radius 0, 1, 2, …
-            let radius = (size(distance) * 0.5).floor() as usize;
-            let reach = reach(source, pixel, radius);
+            let radius = radius(distance);
+            // Rows are as wide as their own pixels ask for.
+            let across = if is_separable { most } else { radius };
+            let reach = reach(source, pixel, across, radius);
             if let Some(pyramid) = &pyramid {
                 let extremes = pyramid.of(reach);
                 if extremes.least == 1.0 || extremes.greatest == 0.0 {
                     return (shadow, 1);
                 }
             }
-            let blurred = if self.params.variant == Variant::Pcf {
-                self.box_filter(source, pixel, reach)
-            } else {
-                self.gaussian(source, pixel, radius)
+            let blurred = match &rows {
+                Some(rows) => self.column(source, rows, pixel, radius),
+                None if self.params.variant == Variant::Pcf => self.box_filter(source, pixel, reach),
+                None => self.gaussian(source, pixel, radius),
             };
             (blurred, 0)
         };
@@ -169,8 +168,54 @@ impl Paper<'_> {
         if all > 0.0 { dark / all } else { map.shadow[pixel] }
     }
 
-    /// Whether `other` has an S that counts for `pixel`: with `geometry`, if each lies within 30° of the other's
-    /// plane, as on any surface that bends by less than that under the kernel.
+    /// The Gaussian along a row; S itself where there is none.
+    fn row(&self, map: &DistanceMap, pixel: usize, radius: usize) -> f32 {
+        let PixelRect { first, last } = reach(map, pixel, radius, 0);
+        let start = pixel - pixel % map.width;
+        self.line(
+            map,
+            &map.shadow,
+            pixel,
+            radius,
+            (first[0]..=last[0]).map(|x| (start + x, x)),
+            pixel % map.width,
+        )
+    }
+
+    /// The Gaussian of blurred rows along a column.
+    fn column(&self, map: &DistanceMap, rows: &[f32], pixel: usize, radius: usize) -> f32 {
+        let PixelRect { first, last } = reach(map, pixel, 0, radius);
+        let x = pixel % map.width;
+        let places = (first[1]..=last[1]).map(|y| (y * map.width + x, y));
+        self.line(map, rows, pixel, radius, places, pixel / map.width)
+    }
+
+    /// The 3-sigma Gaussian of `values` over pixels at places, around `own`.
+    fn line(
+        &self,
+        map: &DistanceMap,
+        values: &[f32],
+        pixel: usize,
+        radius: usize,
+        places: impl Iterator<Item = (usize, usize)>,
+        own: usize,
+    ) -> f32 {
+        let (mut dark, mut all) = (0.0, 0.0);
+        for (other, place) in places.filter(|&(other, _)| self.counts(map, pixel, other)) {
+            let share = place.abs_diff(own) as f32 / radius.max(1) as f32;
+            let weight = (-4.5 * share * share).exp();
+            dark += weight * values[other];
+            all += weight;
+        }
+        if all > 0.0 { dark / all } else { values[pixel] }
+    }
+
+    /// Whether `other` has an S that counts for `pixel`: with `geometry`, if the height of each over the other's plane is
+    /// below sin 45° of their distance.
+    ///
+    /// Over an edge where a surface bends by β, pixels a and b away from it are √(a² + b² + 2ab·cos β) apart and a·sin β,
+    /// b·sin β high; the larger height is the least share of the distance where a = b, sin(β/2). This is the largest
+    /// limit under which nothing counts across a right angle or a sharper edge, so all that bends less is one surface.
     #[inline]
     fn counts(&self, map: &DistanceMap, pixel: usize, other: usize) -> bool {
         if map.shadow[other].is_nan() {
@@ -180,16 +225,16 @@ impl Paper<'_> {
             return true;
         }
         let apart = self.gbuffer.position[other] - self.gbuffer.position[pixel];
-        let limit = 0.5 * apart.length();
-        [pixel, other].iter().all(|&at| self.gbuffer.normal[at].dot(apart).abs() <= limit)
+        let limit = std::f32::consts::FRAC_1_SQRT_2 * apart.length();
+        [pixel, other].iter().all(|&at| self.gbuffer.normal[at].dot(apart).abs() < limit)
     }
 }
 
-/// The pixels within `radius` columns and rows, cut at the border.
-fn reach(map: &DistanceMap, pixel: usize, radius: usize) -> PixelRect {
+/// The pixels within `across` columns and `down` rows, cut at the border.
+fn reach(map: &DistanceMap, pixel: usize, across: usize, down: usize) -> PixelRect {
     let (x, y) = (pixel % map.width, pixel / map.width);
     PixelRect {
-        first: [x.saturating_sub(radius), y.saturating_sub(radius)],
-        last: [(x + radius).min(map.width - 1), (y + radius).min(map.height - 1)],
+        first: [x.saturating_sub(across), y.saturating_sub(down)],
+        last: [(x + across).min(map.width - 1), (y + down).min(map.height - 1)],
     }
 }

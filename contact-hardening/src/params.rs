@@ -57,6 +57,31 @@ pub enum Blocker {
     Minimum,
 }
 
+/// How the Gaussian of `paper` scaling is sampled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GaussianKernel {
+    /// By `taps` Poisson points, whatever its width.
+    #[default]
+    PoissonDisk,
+    /// By every pixel of a row, then of a column.
+    Separable,
+}
+
+/// What is written for a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Show {
+    /// V.
+    #[default]
+    Visibility,
+    /// The distance map of pass 2: D over the greatest in the image where a pixel is shadowed, 1 elsewhere.
+    Distance,
+    /// Penumbrae as dark gradients around grey umbrae, as in figures 4 and 5 of the paper: 2·V − 1 in the outer
+    /// half, ½ − V in the inner one.
+    Penumbra,
+}
+
 /// Settings of [`ContactHardening`](crate::ContactHardening).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -81,6 +106,8 @@ pub struct ContactHardeningParams {
     /// Points that the image cannot answer (hidden, outside, or nearer to each other than pixels are) are looked up
     /// in the map, with `physical` scaling. Off is the paper. `multi-pass` never does.
     pub fill: bool,
+    /// How the Gaussian of `paper` scaling is sampled.
+    pub kernel: GaussianKernel,
     /// Widest kernel with `paper` scaling, pixels, 1 to 255.
     pub kernel_size: u32,
     /// `multi-pass` with `paper` scaling starts with 3 pixels and widens to `kernel_size`.
@@ -91,6 +118,8 @@ pub struct ContactHardeningParams {
     pub distance_power: f32,
     /// Factor of the distance with `paper` scaling (`D_m`), pixels, 0 to 1,000,000.
     pub distance_multiplier: f32,
+    /// What is written for a pixel.
+    pub show: Show,
     /// What random numbers are drawn from.
     pub seed: u32,
     /// Leave out what cannot change the image. Off only to measure.
@@ -108,11 +137,13 @@ impl ContactHardeningParams {
         geometry: true,
         smooth: true,
         fill: true,
+        kernel: GaussianKernel::PoissonDisk,
         kernel_size: 19,
         widening: true,
         dilate: 0,
         distance_power: 1.0,
         distance_multiplier: 20.0,
+        show: Show::Visibility,
         seed: 0,
         skip: true,
     };
@@ -128,6 +159,19 @@ impl ContactHardeningParams {
         fill: false,
         ..Self::DEFAULT
     };
+}
+
+impl ContactHardeningParams {
+    /// The kernel's width in pixels in a pass of `multi-pass` with `paper` scaling.
+    pub fn pass_size(&self, pass: u32) -> f32 {
+        let (most, passes) = (self.kernel_size as f32, self.passes);
+        let first = most.min(3.0);
+        if self.widening && passes > 1 {
+            first + (most - first) * pass as f32 / (passes - 1) as f32
+        } else {
+            most
+        }
+    }
 }
 
 impl Default for ContactHardeningParams {
@@ -194,6 +238,12 @@ impl Params for ContactHardeningParams {
             "look up in the map what the image cannot answer, with physical scaling; false is the paper",
         ),
         setting(
+            "kernel",
+            SettingKind::Choice(&["poisson-disk", "separable"]),
+            "",
+            "the Gaussian of paper scaling: points of a disk, or every pixel of a row and then of a column",
+        ),
+        setting(
             "kernel_size",
             SettingKind::Int { min: 1, max: 255 },
             "pixels",
@@ -222,6 +272,12 @@ impl Params for ContactHardeningParams {
             SettingKind::Float { min: 0.0, max: 1e6 },
             "pixels",
             "factor of the blocker's distance, in scene units, with paper scaling",
+        ),
+        setting(
+            "show",
+            SettingKind::Choice(&["visibility", "distance", "penumbra"]),
+            "",
+            "write V, the distance map of pass 2, or where penumbra and umbra are",
         ),
         setting(
             "seed",

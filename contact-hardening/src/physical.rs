@@ -15,13 +15,14 @@ use glam::{Mat4, Vec2, Vec3};
 use gnomon_shadow_map::light_cone::LightCone;
 use gnomon_shadow_map::light_maps::{LightMaps, Receiver};
 use gnomon_shadow_map::pixel_hash::pixel_numbers;
-use gnomon_shadow_map::receiver_plane::{is_behind, is_near, meets, rises_above};
+use gnomon_shadow_map::receiver_plane::rises_above;
 use scene_core::light::LightPoint;
 use scene_core::{GBuffer, Light};
 
 use crate::distance_map::{DistanceMap, to_light};
 use crate::footprint::{Footprint, spread};
 use crate::kernel::Kernel;
+use crate::look_up::{Lines, LookUps, Met};
 use crate::params::{Blocker, ContactHardeningParams};
 use crate::shadow_pyramid::{Extremes, PixelRect, ShadowPyramid};
 
@@ -38,6 +39,8 @@ pub struct Physical<'a> {
     pub params: &'a ContactHardeningParams,
     /// Pass 1.
     pub maps: &'a LightMaps<'a>,
+    /// Its look-ups.
+    pub look_ups: &'a LookUps<'a>,
     /// Surfaces.
     pub gbuffer: &'a GBuffer,
     /// Pass 2.
@@ -155,8 +158,8 @@ impl Physical<'_> {
         Some(Site { receiver, cone, footprint, reach, t, extremes })
     }
 
-    /// Step 2.
-    pub fn search(&self, site: &Site) -> Blockers {
+    /// Step 2. Counts in `clear` the searches of the map that were proved empty.
+    pub fn search(&self, site: &Site, lines: &Lines<'_, '_>, clear: &mut u64) -> Blockers {
         let mut blockers = Blockers::NONE;
         let width = self.distance.width;
         let [x, y] = site.receiver.pixel.map(|at| at as usize);
@@ -165,36 +168,42 @@ impl Physical<'_> {
             return blockers;
         }
         let PixelRect { first, last } = site.reach;
-        if self.params.fill && self.is_narrow(site, site.t) {
-            // Shadows may be thinner than pixels are.
-            for (at, _) in self.kernel.turned(self.numbers(site)) {
-                if let Probe::Blocked(t) = self.look_up(site, site.cone.share(at), site.t) {
-                    blockers.add(t, self.is_parallel());
-                }
-            }
-        } else if site.reach.count() <= self.kernel.points.len() {
+        let is_narrow = self.params.fill && self.is_narrow(site, site.t);
+        if !is_narrow && site.reach.count() <= self.kernel.points.len() {
             for row in first[1]..=last[1] {
                 for column in first[0]..=last[0] {
                     self.ask(site, row * width + column, &mut blockers);
                 }
             }
-        } else {
-            for (point, _) in self.kernel.turned(self.numbers(site)) {
-                let at = site.cone.share(point);
-                let pixel = self.pixel(site.footprint.pixel(at, site.t));
-                if let Some(pixel) = pixel {
-                    self.ask(site, pixel, &mut blockers);
-                }
-                let seen = pixel.is_some_and(|pixel| self.knows(site, at, site.t, pixel));
-                if self.params.fill
-                    && !seen
-                    && let Probe::Blocked(t) = self.look_up(site, at, site.t)
-                {
-                    blockers.add(t, self.is_parallel());
-                }
+            return blockers;
+        }
+        let fill = self.params.fill && !self.is_clear(lines, site.t, clear);
+        if is_narrow && !fill {
+            return blockers;
+        }
+        for (point, _) in self.kernel.turned(self.numbers(site)) {
+            let at = site.cone.share(point);
+            // Shadows may be thinner than pixels are.
+            let mut seen = false;
+            if !is_narrow && let Some(pixel) = self.pixel(site.footprint.pixel(at, site.t)) {
+                self.ask(site, pixel, &mut blockers);
+                seen = fill && self.knows(site, at, site.t, pixel);
+            }
+            if fill
+                && !seen
+                && let Met::Blocker(t) = lines.look_up(at, site.t)
+            {
+                blockers.add(t, self.is_parallel());
             }
         }
         blockers
+    }
+
+    /// Whether the map is proved to hold nothing at `t`; never asked where skipping is off.
+    fn is_clear(&self, lines: &Lines<'_, '_>, t: f32, clear: &mut u64) -> bool {
+        let is_clear = self.params.skip && lines.is_clear(self.kernel.reach, t);
+        *clear += u64::from(is_clear);
+        is_clear
     }
 
     /// Counts the blocker of `pixel`, if it has one between the receiver and the light.
@@ -253,16 +262,24 @@ impl Physical<'_> {
             || share.abs() <= t * cell && beside.length() <= 2.0 * cell * axis * spread(t, self.is_parallel())
     }
 
-    /// Step 3: V.
-    pub fn filter(&self, site: &Site, blockers: &Blockers, mean: f32) -> f32 {
-        // Where all in reach is shadowed, nothing else is asked: this is the umbra that the pyramid proves.
-        let fill = self.params.fill && !site.is_umbra();
+    /// Step 3: V. Counts in `clear` the layers of the map that were proved empty.
+    pub fn filter(
+        &self,
+        site: &Site,
+        lines: &Lines<'_, '_>,
+        blockers: &Blockers,
+        mean: f32,
+        clear: &mut u64,
+    ) -> f32 {
+        if site.is_umbra() {
+            // All that can be asked is shadowed: this is the umbra that the pyramid proves.
+            return 0.0;
+        }
         let mut layers = [mean; MAX_LAYERS];
         let mut count = 1;
         match self.params.blocker {
             Blocker::Average => {}
             Blocker::Minimum => layers[0] = blockers.least,
-            Blocker::Each if site.is_umbra() => {}
             Blocker::Each => {
                 // A step widens the footprint by at most √2.
                 let ratio = blockers.greatest / blockers.least;
@@ -275,17 +292,24 @@ impl Physical<'_> {
             }
         }
         let layers = &layers[..count];
-        let narrow = fill && self.is_narrow(site, mean);
+        let narrow = self.params.fill && self.is_narrow(site, mean);
+        let mut fill = [self.params.fill; MAX_LAYERS];
+        if self.params.fill {
+            for (fill, &t) in fill.iter_mut().zip(layers) {
+                *fill = !self.is_clear(lines, t, clear);
+            }
+        }
+        let asker = Asker { physical: self, site, lines, narrow, fill: &fill };
         let (mut dark, mut all) = (0.0, 0.0);
         for (point, weight) in self.kernel.turned(self.numbers(site)) {
             let at = site.cone.share(point);
             let blocked = match layers {
-                [t] => match self.probe(site, at, *t, narrow, fill) {
+                [t] => match asker.probe(at, 0, *t) {
                     Probe::Lit => Some(false),
                     Probe::Blocked(_) => Some(true),
                     Probe::Unknown => None,
                 },
-                _ => self.passes(site, at, layers, narrow, fill),
+                _ => asker.passes(at, layers),
             };
             if let Some(blocked) = blocked {
                 all += weight;
@@ -301,17 +325,37 @@ impl Physical<'_> {
     }
 
     /// Whether pixels are farther from each other than the kernel's points are.
-    fn is_narrow(&self, site: &Site, t: f32) -> bool {
+    pub fn is_narrow(&self, site: &Site, t: f32) -> bool {
         let side = (self.kernel.points.len() as f32).sqrt();
         site.footprint.bounds(self.kernel.reach, t).is_some_and(|(min, max)| (max - min).min_element() < side)
     }
 
+    /// Whether `pixel` has an S that [answers](Self::answers).
+    #[inline]
+    fn knows(&self, site: &Site, at: Vec2, t: f32, pixel: usize) -> bool {
+        !self.distance.shadow[pixel].is_nan() && self.answers(site, at, t, pixel)
+    }
+}
+
+/// What step 3 asks points of the light with.
+#[derive(Clone, Copy)]
+struct Asker<'a> {
+    physical: &'a Physical<'a>,
+    site: &'a Site,
+    lines: &'a Lines<'a, 'a>,
+    /// Whether the map is asked at once.
+    narrow: bool,
+    /// Of each layer, whether the map may hold anything.
+    fill: &'a [bool; MAX_LAYERS],
+}
+
+impl Asker<'_> {
     /// Whether the line to the light's point `at` is blocked anywhere between the layers; `None` if no layer knows.
-    fn passes(&self, site: &Site, at: Vec2, layers: &[f32], narrow: bool, fill: bool) -> Option<bool> {
+    fn passes(&self, at: Vec2, layers: &[f32]) -> Option<bool> {
         let half = 0.5 * (layers[1] / layers[0]).ln();
         let (mut before, mut known) = (0.0f32, false);
         for (index, &t) in layers.iter().enumerate() {
-            match self.probe(site, at, t, narrow, fill) {
+            match self.probe(at, index, t) {
                 Probe::Unknown => before = 0.0,
                 Probe::Lit => {
                     known = true;
@@ -333,45 +377,28 @@ impl Physical<'_> {
         known.then_some(false)
     }
 
-    /// Whether `pixel` has an S that [answers](Self::answers).
     #[inline]
-    fn knows(&self, site: &Site, at: Vec2, t: f32, pixel: usize) -> bool {
-        !self.distance.shadow[pixel].is_nan() && self.answers(site, at, t, pixel)
-    }
-
-    #[inline]
-    fn probe(&self, site: &Site, at: Vec2, t: f32, narrow: bool, fill: bool) -> Probe {
-        if !narrow
-            && let Some(pixel) = self.pixel(site.footprint.pixel(at, t))
-            && self.knows(site, at, t, pixel)
+    fn probe(&self, at: Vec2, layer: usize, t: f32) -> Probe {
+        let Self { physical, site, .. } = self;
+        if !self.narrow
+            && let Some(pixel) = physical.pixel(site.footprint.pixel(at, t))
+            && physical.knows(site, at, t, pixel)
         {
-            return match self.distance.shadow[pixel] {
+            return match physical.distance.shadow[pixel] {
                 0.0 => Probe::Lit,
-                _ if self.distance.distance[pixel] == 0.0 => Probe::Blocked(t),
-                _ => Probe::Blocked(site.cone.locate(self.blocker(pixel)).z),
+                _ if physical.distance.distance[pixel] == 0.0 => Probe::Blocked(t),
+                _ => Probe::Blocked(site.cone.share_of(physical.blocker(pixel))),
             };
         }
-        if fill { self.look_up(site, at, t) } else { Probe::Unknown }
-    }
-
-    /// The same from the map: the surface stored where the line to the light's point is at `t`.
-    fn look_up(&self, site: &Site, at: Vec2, t: f32) -> Probe {
-        let Receiver { point, normal, tolerance, .. } = site.receiver;
-        let Some(stored) = self.maps.occluder(point + site.cone.direction(at) * t) else {
-            return Probe::Lit;
-        };
-        let share = site.cone.locate(stored.point).z;
-        let before_light = share > 0.0 && (share < 1.0 || self.is_parallel());
-        if !(before_light && rises_above(stored.point, point, normal, tolerance)) {
+        if !physical.params.fill {
+            return Probe::Unknown;
+        }
+        if !self.fill[layer] {
             return Probe::Lit;
         }
-        // The questions of shadow-map's `receiver_plane`; a neighbour on the same surface is asked outright, by the
-        // line to this point of the light.
-        let corners = self.maps.scene.corners(stored.triangle);
-        let near = is_near(stored.point, point, normal, self.center(), stored.texel);
-        let line = LightPoint::Towards(site.cone.direction(at));
-        let blocks =
-            is_behind(corners, point, self.center(), tolerance) && (!near || meets(corners, point, line));
-        if blocks { Probe::Blocked(share) } else { Probe::Lit }
+        match self.lines.look_up(at, t) {
+            Met::Nothing => Probe::Lit,
+            Met::Blocker(share) => Probe::Blocked(share),
+        }
     }
 }

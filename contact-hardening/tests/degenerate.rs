@@ -110,7 +110,7 @@ fn any_technique_can_be_the_source() {
     };
     let source = |map_size: u32| -> ContactHardening {
         let hard = ShadowMap::new(ShadowMapParams { map_size, ..Default::default() });
-        ContactHardening::new(params).on_top_of(Arc::new(hard))
+        ContactHardening::new(params).on_top_of("hard", Arc::new(hard))
     };
     let own = shade(ContactHardening::new(params));
     assert_eq!(own, shade(source(256)));

@@ -80,6 +80,18 @@ impl LightCone {
         self.light_from_world * (point - self.receiver)
     }
 
+    /// What the vector from the receiver to a point is multiplied with for t alone.
+    #[inline]
+    pub fn share_axis(&self) -> Vec3 {
+        self.light_from_world.row(2)
+    }
+
+    /// t alone of a point in world space.
+    #[inline]
+    pub fn share_of(&self, point: Vec3) -> f32 {
+        self.share_axis().dot(point - self.receiver)
+    }
+
     /// Whether a point with these coordinates lies in the cone, on the light's side of the receiver.
     #[inline]
     pub fn contains(&self, located: Vec3) -> bool {
