@@ -18,6 +18,7 @@ mod picture;
 mod recommend;
 mod report;
 mod scene_source;
+mod source;
 mod stress;
 mod techniques;
 

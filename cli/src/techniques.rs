@@ -3,6 +3,7 @@
 use scene_core::technique::{SettingKind, ShadowTechnique, TechniqueFactory};
 
 use crate::error::CliError;
+use crate::source::OnAnySource;
 
 /// Every technique, in the order of the tables.
 pub(crate) fn all() -> [&'static dyn TechniqueFactory; 6] {
@@ -12,7 +13,7 @@ pub(crate) fn all() -> [&'static dyn TechniqueFactory; 6] {
         &gnomon_stencil_volumes::Factory,
         &gnomon_penumbra_wedges::Factory,
         &gnomon_pdsm::Factory,
-        &gnomon_contact_hardening::Factory,
+        &OnAnySource(&gnomon_contact_hardening::Factory),
     ]
 }
 

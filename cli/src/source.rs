@@ -1,0 +1,104 @@
+//! The setting `source` of contact-hardening: which technique's hard shadows are blurred. The crate takes any technique;
+//! which ones have a name is the command's matter.
+
+use std::sync::{Arc, LazyLock};
+
+use gnomon_contact_hardening::{ContactHardening, ContactHardeningParams, Factory};
+use scene_core::technique::{Params, Setting, SettingKind, SettingsError, ShadowTechnique, TechniqueFactory};
+
+/// Names of sources: the technique's own map first.
+const NAMES: [&str; 6] = ["own", "uniform", "alias-free", "cascaded", "psm", "volumes"];
+
+/// What each but the first is: a technique and its settings.
+const SOURCES: [(&dyn TechniqueFactory, &[(&str, &str)]); NAMES.len() - 1] = [
+    (&gnomon_shadow_map::Factory, &[("variant", "hard")]),
+    (&gnomon_shadow_map::Factory, &[("variant", "alias-free")]),
+    (&gnomon_shadow_map::Factory, &[("variant", "cascaded")]),
+    (&gnomon_psm::Factory, &[]),
+    (&gnomon_stencil_volumes::Factory, &[]),
+];
+
+static SETTINGS: LazyLock<Vec<Setting>> = LazyLock::new(|| {
+    let source = Setting {
+        name: "source",
+        kind: SettingKind::Choice(&NAMES),
+        unit: "",
+        doc: "whose hard shadows are blurred: the own map's, or another technique's of the same map_size",
+    };
+    ContactHardeningParams::SETTINGS.iter().copied().chain([source]).collect()
+});
+
+/// Contact-hardening with the setting `source`.
+pub(crate) struct OnAnySource(pub(crate) &'static Factory);
+
+impl TechniqueFactory for OnAnySource {
+    fn name(&self) -> &'static str {
+        self.0.name()
+    }
+
+    fn summary(&self) -> &'static str {
+        self.0.summary()
+    }
+
+    fn settings(&self) -> &'static [Setting] {
+        &SETTINGS
+    }
+
+    fn presets(&self) -> Vec<&'static str> {
+        self.0.presets()
+    }
+
+    fn create(
+        &self,
+        preset: Option<&str>,
+        overrides: &[(String, String)],
+    ) -> Result<Box<dyn ShadowTechnique>, SettingsError> {
+        let (sources, own): (Vec<_>, Vec<_>) =
+            overrides.iter().cloned().partition(|(key, _)| key == "source");
+        let params = ContactHardeningParams::from_overrides(preset, &own)?;
+        let technique = ContactHardening::new(params);
+        // The last word counts, as everywhere.
+        let Some((key, name)) = sources.last() else { return Ok(Box::new(technique)) };
+        let place = NAMES.iter().position(|known| known == name).ok_or_else(|| SettingsError::BadValue {
+            technique: self.name(),
+            key: key.clone(),
+            value: name.clone(),
+            expected: SettingKind::Choice(&NAMES).expected(),
+        })?;
+        let Some((factory, settings)) = place.checked_sub(1).and_then(|place| SOURCES.get(place)) else {
+            return Ok(Box::new(technique));
+        };
+        let mut settings: Vec<_> =
+            settings.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
+        if factory.settings().iter().any(|setting| setting.name == "map_size") {
+            settings.push(("map_size".to_owned(), params.map_size.to_string()));
+        }
+        let source: Arc<dyn ShadowTechnique> = factory.create(None, &settings)?.into();
+        Ok(Box::new(technique.on_top_of(name.clone(), source)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FACTORY: OnAnySource = OnAnySource(&Factory);
+
+    fn create(source: &str) -> Result<Box<dyn ShadowTechnique>, SettingsError> {
+        FACTORY.create(Some("low"), &[("source".to_owned(), source.to_owned())])
+    }
+
+    #[test]
+    fn every_source_is_made_and_told() {
+        for name in NAMES {
+            assert_eq!(create(name).unwrap().settings()["source"], name);
+        }
+        assert_eq!(FACTORY.create(None, &[]).unwrap().settings()["source"], "own");
+    }
+
+    #[test]
+    fn an_unknown_source_is_told_with_what_is_known() {
+        let error = create("moon").err().unwrap().to_string();
+        assert!(error.contains("moon") && error.contains("psm"), "{error}");
+    }
+}
