@@ -1,87 +1,93 @@
-//! The Ball scene by every way of blurring, as in the paper's figure 5, A to G, and the physical scaling beside ground
-//! truth: `cargo run --release -p gnomon-contact-hardening --example rows [SCENE]` writes `rows.png` and prints errors.
+//! A scene by every way of blurring, as in the paper's figure 5, A to G, penumbrae marked as there:
+//! `cargo run --release -p gnomon-contact-hardening --example rows [SCENE] [FOLDER]` writes `figure-5.png` and prints errors
+//! of ground truth. Below the row, `physical` scaling and ground truth.
+
+mod shared;
 
 use std::error::Error;
-use std::path::Path;
+use std::path::PathBuf;
 
-use gnomon_contact_hardening::{ContactHardening, ContactHardeningParams, Scaling, Variant};
+use gnomon_contact_hardening::{ContactHardening, ContactHardeningParams, Show, Variant};
 use gnomon_shadow_map::{Kernel, ShadowMap, ShadowMapParams, Variant as MapVariant};
-use scene_core::bvh::Bvh;
+use scene_core::VisibilityImage;
 use scene_core::io::write;
-use scene_core::reference::{self, ReferenceSettings, no_progress};
-use scene_core::technique::{ShadowQuery, ShadowTechnique};
-use scene_core::{VisibilityImage, metrics, raster, scenes};
+use shared::{Case, as_published, in_rows};
 
 /// Pixels a picture.
 const SIZE: [u32; 2] = [160, 128];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let name = std::env::args().nth(1).unwrap_or_else(|| "ball".to_owned());
-    let mut setup = scenes::build(&name, 0.0)?;
-    [setup.camera.width, setup.camera.height] = SIZE;
-    let (scene, light) = (&setup.scene, &setup.lights[0]);
-    let gbuffer = raster::render_gbuffer(scene, &setup.camera);
-    let sampling = ReferenceSettings { samples: 256, ..Default::default() };
-    let truth = reference::reference(scene, &Bvh::casters(scene), light, &gbuffer, &sampling, &no_progress)
-        .map_err(|_| "cancelled")?;
-    let valid = reference::valid_pixels(&gbuffer, light);
+    let mut words = std::env::args().skip(1);
+    let scene = words.next().unwrap_or_else(|| "ball".to_owned());
+    let folder = PathBuf::from(words.next().unwrap_or_else(|| ".".to_owned()));
+    let case = Case::new(&scene, SIZE, 256)?;
 
-    let uniform = |filter: u32| -> Box<dyn ShadowTechnique> {
-        let variant = if filter == 0 { MapVariant::Hard } else { MapVariant::Pcf };
-        let filter = filter.max(1);
-        Box::new(ShadowMap::new(ShadowMapParams {
+    let map = |variant: MapVariant, filter: u32| -> Result<(VisibilityImage, f64), Box<dyn Error>> {
+        let kernel = Kernel::Grid;
+        case.run(&ShadowMap::new(ShadowMapParams {
             variant,
             filter,
             map_size: 256,
-            kernel: Kernel::Grid,
+            kernel,
             ..Default::default()
         }))
     };
-    let blurred = |variant: Variant, scaling: Scaling| -> Box<dyn ShadowTechnique> {
-        let distance_multiplier = 12.0;
-        Box::new(ContactHardening::new(ContactHardeningParams {
-            variant,
-            scaling,
-            distance_multiplier,
-            ..Default::default()
-        }))
-    };
-    let techniques = [
-        ("A hard", uniform(0)),
-        ("C uniform 5x5", uniform(5)),
-        ("D uniform 7x7", uniform(7)),
-        ("E pcf, paper", blurred(Variant::Pcf, Scaling::Paper)),
-        ("F gaussian, paper", blurred(Variant::Gaussian, Scaling::Paper)),
-        ("G multi-pass, paper", blurred(Variant::MultiPass, Scaling::Paper)),
-        ("pcf", blurred(Variant::Pcf, Scaling::Physical)),
-        ("gaussian", blurred(Variant::Gaussian, Scaling::Physical)),
-        ("multi-pass", blurred(Variant::MultiPass, Scaling::Physical)),
+    let blurred = |params: ContactHardeningParams| case.run(&ContactHardening::new(params));
+    // Widths of up to 19 pixels, as the paper's; its D_p and D_m are for its own units.
+    let paper = |variant: Variant| blurred(as_published(variant, 12.0));
+    let physical = |variant: Variant| blurred(ContactHardeningParams { variant, ..Default::default() });
+    let hard = map(MapVariant::Hard, 1)?;
+    let uniform = (uniform_gaussian(&hard.0), hard.1);
+    let pictures = [
+        ("A hard", hard),
+        ("B uniform Gaussian 5x5", uniform),
+        ("C uniform 5x5", map(MapVariant::Pcf, 5)?),
+        ("D uniform 7x7", map(MapVariant::Pcf, 7)?),
+        ("E pcf, paper", paper(Variant::Pcf)?),
+        ("F gaussian, paper", paper(Variant::Gaussian)?),
+        ("G multi-pass, paper", paper(Variant::MultiPass)?),
+        ("pcf, physical", physical(Variant::Pcf)?),
+        ("gaussian, physical", physical(Variant::Gaussian)?),
+        ("multi-pass, physical", physical(Variant::MultiPass)?),
     ];
-    let mut images = vec![truth.visibility.clone()];
-    println!("{:<20} {:>8} {:>8} {:>8}", "", "rmse", "pen_rmse", "ms");
-    for (label, technique) in &techniques {
-        let query = ShadowQuery { scene, light, camera: &setup.camera };
-        let (prepared, mut report) = technique.prepare(&query)?;
-        let mut image = VisibilityImage::new(gbuffer.width, gbuffer.height);
-        report.merge(&prepared.shade(&gbuffer, &mut image)?);
-        let errors = metrics::errors(&image, &truth.visibility, &valid)?;
-        println!("{label:<20} {:>8.4} {:>8.4} {:>8.2}", errors.rmse, errors.pen_rmse, report.total_ms(""));
-        images.push(image);
+    println!("{:<24} {:>8} {:>8} {:>8}", "", "rmse", "pen_rmse", "ms");
+    for (label, (image, ms)) in &pictures {
+        let errors = case.errors(image)?;
+        println!("{label:<24} {:>8.4} {:>8.4} {ms:>8.1}", errors.rmse, errors.pen_rmse);
     }
-    write::visibility_png(Path::new("rows.png"), &in_rows(&images))?;
+    let marked: Vec<VisibilityImage> =
+        pictures.iter().map(|(_, (image, _))| image).chain([&case.truth]).map(marked).collect();
+    write::visibility_png(&folder.join("figure-5.png"), &in_rows(&marked, 7))?;
     Ok(())
 }
 
-/// The pictures, five a row.
-fn in_rows(images: &[VisibilityImage]) -> VisibilityImage {
-    let rows = images.len().div_ceil(5) as u32;
-    let mut all = VisibilityImage::new(SIZE[0] * 5, SIZE[1] * rows);
-    for (index, image) in (0..).zip(images) {
-        let place = (index / 5 * SIZE[1] * all.width + index % 5 * SIZE[0]) as usize;
-        for (row, values) in image.values.chunks(SIZE[0] as usize).enumerate() {
-            let start = place + row * all.width as usize;
-            all.values[start..start + values.len()].copy_from_slice(values);
+/// As `show=penumbra` writes it.
+fn marked(image: &VisibilityImage) -> VisibilityImage {
+    let mut marked = image.clone();
+    marked.values.iter_mut().for_each(|value| *value = Show::penumbra_mark(*value));
+    marked
+}
+
+/// A Gaussian of 5 × 5 pixels over the whole image, 3-sigma.
+fn uniform_gaussian(image: &VisibilityImage) -> VisibilityImage {
+    let (width, height) = (image.width as i32, image.height as i32);
+    let mut blurred = image.clone();
+    for (index, value) in (0..).zip(&mut blurred.values) {
+        let (mut sum, mut all) = (0.0, 0.0);
+        for (x, y) in (-2..=2).flat_map(|x| (-2..=2).map(move |y| (x, y))) {
+            let (column, row) = (index % width + x, index / width + y);
+            let weight = (-4.5 * (x * x + y * y) as f32 / 4.0).exp();
+            if (0..width).contains(&column) && (0..height).contains(&row) {
+                let v = image.values[(row * width + column) as usize];
+                if !v.is_nan() {
+                    sum += weight * v;
+                    all += weight;
+                }
+            }
+        }
+        if !value.is_nan() {
+            *value = sum / all;
         }
     }
-    all
+    blurred
 }
