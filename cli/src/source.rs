@@ -9,13 +9,13 @@ use scene_core::technique::{Params, Setting, SettingKind, SettingsError, ShadowT
 /// Names of sources: the technique's own map first.
 const NAMES: [&str; 6] = ["own", "uniform", "alias-free", "cascaded", "psm", "volumes"];
 
-/// What each but the first is: a technique and its settings.
-const SOURCES: [(&dyn TechniqueFactory, &[(&str, &str)]); NAMES.len() - 1] = [
-    (&gnomon_shadow_map::Factory, &[("variant", "hard")]),
-    (&gnomon_shadow_map::Factory, &[("variant", "alias-free")]),
-    (&gnomon_shadow_map::Factory, &[("variant", "cascaded")]),
-    (&gnomon_psm::Factory, &[]),
-    (&gnomon_stencil_volumes::Factory, &[]),
+/// What each but the first is: a technique and its variant, `None` for its default.
+const SOURCES: [(&dyn TechniqueFactory, Option<&str>); NAMES.len() - 1] = [
+    (&gnomon_shadow_map::Factory, Some("hard")),
+    (&gnomon_shadow_map::Factory, Some("alias-free")),
+    (&gnomon_shadow_map::Factory, Some("cascaded")),
+    (&gnomon_psm::Factory, None),
+    (&gnomon_stencil_volumes::Factory, None),
 ];
 
 static SETTINGS: LazyLock<Vec<Setting>> = LazyLock::new(|| {
@@ -65,11 +65,11 @@ impl TechniqueFactory for OnAnySource {
             value: name.clone(),
             expected: SettingKind::Choice(&NAMES).expected(),
         })?;
-        let Some((factory, settings)) = place.checked_sub(1).and_then(|place| SOURCES.get(place)) else {
+        let Some((factory, variant)) = place.checked_sub(1).and_then(|place| SOURCES.get(place)) else {
             return Ok(Box::new(technique));
         };
         let mut settings: Vec<_> =
-            settings.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
+            variant.iter().map(|variant| ("variant".to_owned(), (*variant).to_owned())).collect();
         if factory.settings().iter().any(|setting| setting.name == "map_size") {
             settings.push(("map_size".to_owned(), params.map_size.to_string()));
         }

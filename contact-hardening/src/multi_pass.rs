@@ -9,6 +9,7 @@
 //! others such a pixel answers with the S of pass 2.
 
 use glam::Vec2;
+use rayon::iter::Either;
 use rayon::prelude::*;
 
 use crate::distance_map::DistanceMap;
@@ -24,16 +25,10 @@ struct Active {
     passes: u32,
 }
 
-/// What is to be done with a pixel.
-enum Plan {
-    Blur(Active),
-    /// The pixel, and its S.
-    Known(usize, f32),
-}
-
 /// Blurs S of `physical.distance`, in place of which the result is returned; counts the blurs left out.
 pub fn multi_pass(physical: &Physical<'_>, sites: &[Site]) -> (Vec<f32>, u64) {
     let width = physical.distance.width;
+    // A pixel to blur, or one whose S is known.
     let plan = |site: &Site| {
         let lines = physical.look_ups.lines(&site.receiver, &site.cone);
         let blockers = physical.search(site, &lines, &mut 0);
@@ -44,18 +39,12 @@ pub fn multi_pass(physical: &Physical<'_>, sites: &[Site]) -> (Vec<f32>, u64) {
         let [x, y] = site.receiver.pixel.map(|at| at as usize);
         let pixel = y * width + x;
         if physical.params.fill && physical.is_narrow(site, t) {
-            return Some(Plan::Known(pixel, 1.0 - physical.filter(site, &lines, &blockers, t, &mut 0)));
+            return Some(Either::Right((pixel, 1.0 - physical.filter(site, &lines, &blockers, t, &mut 0))));
         }
-        Some(Plan::Blur(Active { site: *site, pixel, t, passes }))
+        Some(Either::Left(Active { site: *site, pixel, t, passes }))
     };
-    let plans: Vec<Plan> = sites.par_iter().filter_map(plan).collect();
-    let (mut active, mut known) = (Vec::new(), Vec::new());
-    for plan in plans {
-        match plan {
-            Plan::Blur(pixel) => active.push(pixel),
-            Plan::Known(pixel, shadow) => known.push((pixel, shadow)),
-        }
-    }
+    let (mut active, known): (Vec<Active>, Vec<(usize, f32)>) =
+        sites.par_iter().filter_map(plan).partition_map(|plan| plan);
     let mut map = DistanceMap { distance: physical.distance.distance.clone(), ..DistanceMap::default() };
     map.shadow.clone_from(&physical.distance.shadow);
     (map.width, map.height) = (width, physical.distance.height);

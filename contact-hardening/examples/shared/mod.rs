@@ -31,8 +31,7 @@ impl Case {
     /// A built-in scene's spec or a scene file, in pictures of `size` pixels, with `samples` rays a pixel.
     pub(crate) fn new(spec: &str, size: [u32; 2], samples: u32) -> Result<Self, Box<dyn Error>> {
         let path = Path::new(spec);
-        let mut setup =
-            if path.extension().is_some() { io::load_setup(path)? } else { scenes::build(spec, 0.0)? };
+        let mut setup = if path.is_file() { io::load_setup(path)? } else { scenes::build(spec, 0.0)? };
         [setup.camera.width, setup.camera.height] = size;
         let gbuffer = raster::render_gbuffer(&setup.scene, &setup.camera);
         let light = &setup.lights[0];
@@ -41,7 +40,8 @@ impl Case {
         let truth = reference::reference(&setup.scene, &casters, light, &gbuffer, &sampling, &no_progress)?
             .visibility;
         let valid = reference::valid_pixels(&gbuffer, light);
-        let name = path.file_stem().map_or(spec.into(), |stem| stem.to_string_lossy().into_owned());
+        let stem = path.file_stem().filter(|_| path.is_file());
+        let name = stem.map_or(spec.into(), |stem| stem.to_string_lossy().into_owned());
         Ok(Self { name, setup, gbuffer, truth, valid })
     }
 
