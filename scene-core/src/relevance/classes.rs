@@ -52,6 +52,16 @@ impl TileClasses {
         self.classes.get((row * self.columns + column) as usize).copied().unwrap_or_default()
     }
 
+    /// V of the receivers of the tile that holds a pixel, where it is proved: they need no lookup and no filter.
+    #[inline]
+    pub fn known(&self, x: u32, y: u32) -> Option<f32> {
+        match self.of_pixel(x, y) {
+            TileClass::Lit => Some(1.0),
+            TileClass::Umbra => Some(0.0),
+            TileClass::Empty | TileClass::Mixed => None,
+        }
+    }
+
     /// How many tiles are of a class.
     pub fn count(&self, class: TileClass) -> usize {
         self.classes.iter().filter(|&&c| c == class).count()
@@ -87,13 +97,9 @@ impl TileClasses {
 /// let mut report = Report::default();
 /// classes.book(&mut report);
 /// assert!(report.skipped["lit tiles"] + report.skipped["umbra tiles"] > 50);
-/// // Receivers of that tile take this value without a lookup.
-/// let known = match classes.of_pixel(300, 20) {
-///     TileClass::Lit => Some(1.0),
-///     TileClass::Umbra => Some(0.0),
-///     TileClass::Empty | TileClass::Mixed => None,
-/// };
-/// # let _: Option<f32> = known;
+/// // Receivers of that tile take this value without a lookup; `None` is to be filtered.
+/// let known: Option<f32> = classes.known(300, 20);
+/// assert_eq!(known.is_some(), matches!(classes.of_pixel(300, 20), TileClass::Lit | TileClass::Umbra));
 /// # Ok::<(), gnomon_scene_core::scenes::SceneSpecError>(())
 /// ```
 ///
