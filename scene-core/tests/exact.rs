@@ -19,6 +19,11 @@ fn flat_light(setup: &SceneSetup) -> Light {
     };
     match setup.lights[0] {
         light @ (Light::Rect { .. } | Light::Disk { .. }) => light,
+        light @ Light::Directional { angular_radius, .. }
+            if angular_radius > 0.0 && angular_radius < 0.01 =>
+        {
+            light
+        }
         Light::Sphere { center, radius } => square(center, 0.886 * radius),
         Light::Point { position } | Light::Spot { position, .. } => {
             square(position, 0.05 * position.distance(target))

@@ -6,6 +6,8 @@
 
 use glam::Vec3;
 
+use super::apexes::Apexes;
+use super::cone::Outline;
 use super::patch::Patch;
 use crate::Scene;
 use crate::bvh::HalfSpace;
@@ -26,8 +28,8 @@ pub(super) struct Receiver {
     pub(super) normal: Vec3,
 }
 
-/// Connecting a triangle costs as much as looking at it from so many points.
-const CONNECTING: usize = 8;
+/// Gathering and connecting a triangle costs as much as looking from so many points at what is left of it.
+const CONNECTING: usize = 24;
 
 /// Blocks of several pixels that gather more triangles than this are split without asking whether it pays.
 const MANY: usize = 1 << 18;
@@ -35,8 +37,11 @@ const MANY: usize = 1 << 18;
 pub(super) struct Gatherer<'a, C> {
     pub(super) scene: &'a Scene,
     pub(super) casters: &'a C,
+    /// Of the scene's vertices, the first at the same position.
+    pub(super) representative: Vec<u32>,
+    pub(super) outline: &'a Outline,
     /// What holds the light for all receivers, if anything does.
-    pub(super) outline: Option<LightOutline>,
+    pub(super) hull: Option<LightOutline>,
     /// Largest coordinate of the scene.
     pub(super) magnitude: f32,
 }
@@ -70,9 +75,9 @@ impl<C: CasterSearch> Gatherer<'_, C> {
     fn gather(&self, receivers: Vec<Receiver>) -> Block {
         let origins: Vec<Vec3> = receivers.iter().map(|receiver| receiver.origin).collect();
         let shaft = self
-            .outline
+            .hull
             .as_ref()
-            .map(|outline| LightShaft::new(&origins, receivers[0].normal, outline, self.magnitude));
+            .map(|hull| LightShaft::new(&origins, receivers[0].normal, hull, self.magnitude));
         let region: &[HalfSpace] = shaft.as_ref().map_or(&[], LightShaft::sides);
         let mut triangles = Vec::new();
         self.casters.each_in(region, |triangle| triangles.push(triangle));
@@ -103,7 +108,9 @@ impl<C: CasterSearch> Gatherer<'_, C> {
                 return;
             }
         }
-        let patch = Patch::new(self.scene, &block.triangles);
+        let origins = block.receivers.iter().map(|receiver| receiver.origin);
+        let apexes = Apexes::new(self.outline, origins);
+        let patch = Patch::new(self.scene, &self.representative, &block.triangles, apexes.as_ref());
         block.receivers.iter().for_each(|receiver| solve(receiver, &patch));
     }
 }

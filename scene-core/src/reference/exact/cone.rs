@@ -17,16 +17,29 @@ const DISK_SIDES: usize = 256;
 /// The light's outline in its own coordinates.
 #[derive(Clone, Debug)]
 pub(super) struct Outline {
-    center: DVec3,
-    axes: [DVec3; 2],
+    pub(super) center: DVec3,
+    pub(super) axes: [DVec3; 2],
     /// Lengths along `axes` in these, as vectors: their products with an offset in the plane are (a, b).
-    duals: [DVec3; 2],
-    normal: DVec3,
+    pub(super) duals: [DVec3; 2],
+    pub(super) normal: DVec3,
     /// Half the side of a square around the outline.
     pub(super) reach: f64,
     polygon: Vec<DVec2>,
     area: f64,
+    kind: Kind,
 }
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Square,
+    /// The unit disk of the plane.
+    Disk,
+    /// The unit disk of the plane at distance 1, `normal` being the direction to its middle.
+    Distant,
+}
+
+/// The largest error of V that a flat disk in a round light's stead may leave.
+const FLATNESS: f64 = 1e-4;
 
 impl Outline {
     /// The outline of a flat light: a rect's own, and for a disk a regular polygon of 256 sides and the same area.
@@ -50,14 +63,61 @@ impl Outline {
         let center = center.as_dvec3();
         if sides == 0 {
             let polygon = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(DVec2::from).into();
-            return Some(Self { center, axes, duals, normal, reach: 1.0, polygon, area: 4.0 });
+            return Some(Self {
+                center,
+                axes,
+                duals,
+                normal,
+                reach: 1.0,
+                polygon,
+                area: 4.0,
+                kind: Kind::Square,
+            });
         }
-        // n triangles of area r²/2·sin(2π/n) add up to π.
-        let half_angle = PI / sides as f64;
-        let reach = (half_angle / (half_angle.sin() * half_angle.cos())).sqrt();
-        let polygon = (0..sides).map(|i| reach * DVec2::from_angle(TAU * i as f64 / sides as f64)).collect();
-        Some(Self { center, axes, duals, normal, reach, polygon, area: PI })
+        let (reach, polygon) = disk();
+        let kind = Kind::Disk;
+        Some(Self { center, axes, duals, normal, reach, polygon, area: PI, kind })
     }
+
+    /// A distant light as a disk of directions d/(d·axis) on the plane at distance 1. `None` for other kinds, and where
+    /// that is off by more than 10⁻⁴: beyond an angular radius of 1.3°.
+    ///
+    /// There a solid angle has the density (1 + r²)^(−3/2) ≈ 1 − 3r²/2. Over a disk of radius R that is above its mean where
+    /// r² < R²/2, by 3R²/8 on average, so the part of the disk that is seen is off by no more than half of that.
+    pub(super) fn distant(light: &Light) -> Option<Self> {
+        let Light::Directional { direction, angular_radius } = *light else { return None };
+        let normal = (-direction.as_dvec3()).try_normalize()?;
+        let radius = f64::from(angular_radius).tan();
+        if !(radius > 0.0 && 3.0 / 16.0 * radius * radius < FLATNESS) {
+            return None;
+        }
+        let u = normal.any_orthonormal_vector();
+        let pair = [u, normal.cross(u)];
+        let (reach, polygon) = disk();
+        Some(Self {
+            center: DVec3::ZERO,
+            axes: pair.map(|axis| axis * radius),
+            duals: pair.map(|axis| axis / radius),
+            normal,
+            reach,
+            polygon,
+            area: PI,
+            kind: Kind::Distant,
+        })
+    }
+
+    pub(super) fn is_distant(&self) -> bool {
+        self.kind == Kind::Distant
+    }
+}
+
+/// A regular polygon of the unit disk's area: half the side of the square around it, and its corners.
+fn disk() -> (f64, Vec<DVec2>) {
+    // n triangles of area r²/2·sin(2π/n) add up to π.
+    let half_angle = PI / DISK_SIDES as f64;
+    let reach = (half_angle / (half_angle.sin() * half_angle.cos())).sqrt();
+    let corner = |i: usize| reach * DVec2::from_angle(TAU * i as f64 / DISK_SIDES as f64);
+    (reach, (0..DISK_SIDES).map(corner).collect())
 }
 
 impl Outline {
@@ -67,6 +127,10 @@ impl Outline {
             Light::Disk { center, normal, radius } => {
                 // Rounding to f32 takes less than the margin that is left around any light.
                 Light::Disk { center, normal, radius: (f64::from(radius) * self.reach) as f32 }
+            }
+            Light::Directional { direction, angular_radius } => {
+                let angular_radius = (f64::from(angular_radius) * self.reach) as f32;
+                Light::Directional { direction, angular_radius }
             }
             _ => *light,
         }
@@ -116,7 +180,7 @@ pub(super) const FAR: u8 = 1 << 6;
 
 /// Places within this many half sides of the middle are known to 2⁻⁴⁶ of one, and areas of triangles of them to 128 times
 /// that at worst: a triangle whose winding is mistaken hides no more than 2⁻³⁹.
-const FARTHEST: f64 = 64.0;
+pub(super) const FARTHEST: f64 = 64.0;
 
 impl<'a> Cone<'a> {
     /// `position` and unit `normal` are those of the surface, `apex` is where its shadow rays start.
@@ -125,6 +189,12 @@ impl<'a> Cone<'a> {
     /// of its distance and the light's size together, which leaves 22 bits to the coordinates.
     pub(super) fn new(outline: &'a Outline, apex: Vec3, position: Vec3, normal: Vec3) -> Self {
         let mut apex = apex.as_dvec3();
+        let normal = normal.as_dvec3();
+        let slopes = DVec2::new(normal.dot(outline.axes[0]), normal.dot(outline.axes[1]));
+        if outline.is_distant() {
+            let rows = [outline.duals[0], outline.duals[1], outline.normal];
+            return Self::of(outline, apex, rows, f64::INFINITY, slopes, normal.dot(outline.normal));
+        }
         let unit = outline.normal.normalize();
         let size = outline.center.distance(apex) + outline.axes[0].length() + outline.axes[1].length();
         let clearance = size * 2f64.powi(-30);
@@ -139,9 +209,18 @@ impl<'a> Cone<'a> {
         let row = |dual: DVec3| dual * depth - facing * to_center.dot(dual);
         let rows = [row(outline.duals[0]), row(outline.duals[1]), facing];
 
-        let normal = normal.as_dvec3();
-        let slopes = DVec2::new(normal.dot(outline.axes[0]), normal.dot(outline.axes[1]));
-        let above = normal.dot(outline.center - position.as_dvec3());
+        Self::of(outline, apex, rows, depth, slopes, normal.dot(outline.center - position.as_dvec3()))
+    }
+
+    /// `slopes` and `above` give the height over the tangent plane of a place on the light.
+    fn of(
+        outline: &'a Outline,
+        apex: DVec3,
+        rows: [DVec3; 3],
+        depth: f64,
+        slopes: DVec2,
+        above: f64,
+    ) -> Self {
         let reach = outline.reach;
         let side = |a, b, w| Side { gradient: DVec3::new(a, b, w), offset: 0.0 };
         let sides = [
@@ -149,7 +228,8 @@ impl<'a> Cone<'a> {
             side(-1.0, 0.0, reach),
             side(0.0, 1.0, reach),
             side(0.0, -1.0, reach),
-            Side { gradient: DVec3::NEG_Z, offset: depth },
+            // Of a distant light there is no end.
+            Side { gradient: DVec3::NEG_Z, offset: depth.min(f64::MAX) },
             side(slopes.x, slopes.y, above),
         ];
         let height = |p: DVec2| slopes.dot(p) + above;
@@ -182,6 +262,12 @@ impl<'a> Cone<'a> {
         let offset = point.as_dvec3() - self.apex;
         let [a, b, w] = self.rows;
         DVec3::new(a.dot(offset), b.dot(offset), w.dot(offset))
+    }
+
+    /// Where a point that surely lies between apex and light is seen on the light.
+    pub(super) fn place(&self, point: Vec3) -> DVec2 {
+        let p = self.homogeneous(point);
+        p.truncate() / p.z
     }
 
     pub(super) fn project(&self, point: Vec3) -> Projected {

@@ -7,7 +7,8 @@
 //! # Limits
 //! `rect` and `disk` lights (and those of no extent, which one ray decides exactly). A disk is a regular
 //! polygon of 256 sides and the same area. Where circle and polygon differ, half each way, lies
-//! (π/256)²·0.26 = 4·10⁻⁵ of the area, so V is off by at most half of that, 2·10⁻⁵.
+//! (π/256)²·0.26 = 4·10⁻⁵ of the area, so V is off by at most half of that, 2·10⁻⁵. A distant light up to 1.3° in radius
+//! is a disk of directions, and V is off by at most 10⁻⁴ more; a real sun's, 0.27° in radius, by 4·10⁻⁶.
 //!
 //! Along the texels of a cut-out mask nothing is gained over samples. V lies between what it would be without the masked
 //! casters and what it would be if they had no holes: where the two are one, as where other casters hide all that the
@@ -16,6 +17,7 @@
 //!
 //! Time grows with the triangles inside the cone, and with the crossings of silhouettes before the light.
 
+mod apexes;
 mod blocks;
 mod cone;
 mod lit_area;
@@ -37,14 +39,16 @@ use super::sampled::{Scratch, Tracer};
 use super::tiles::{Estimate, Reference, TILE, Work, estimate_tiles};
 use super::{Cancelled, CasterSearch, Occlusion, ReferenceSettings, reference};
 use crate::bvh::shadow_origin;
+use crate::geometry::weld;
 use crate::{GBuffer, Light, Scene};
 
 /// Why there is no exact truth.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum ExactError {
-    /// Only flat lights, and those of no extent, can be done exactly.
+    /// Only flat lights, distant ones that are as good as flat, and those of no extent can be done exactly.
     #[error(
-        "exact visibility takes rect and disk lights and those without extent, not this {0} light: use samples"
+        "exact visibility takes rect and disk lights, distant ones up to 1.3° in radius and those without extent, \
+         not this {0} light: use samples"
     )]
     Light(&'static str),
     /// Stopped by the progress callback.
@@ -73,29 +77,40 @@ pub fn exact_reference<C: CasterSearch + Occlusion>(
     if !is_flat && !light.is_extended() {
         return Ok(reference(scene, casters, light, gbuffer, settings, progress)?);
     }
-    let outline = Outline::new(light).ok_or(ExactError::Light(light.kind()))?;
-    let magnitude = scene.bounds().magnitude();
+    let outline = Outline::new(light).or_else(|| Outline::distant(light));
+    let outline = outline.ok_or(ExactError::Light(light.kind()))?;
+    let tracer = Tracer { casters, light, gbuffer, settings, magnitude: scene.bounds().magnitude() };
+    Ok(solve(scene, tracer, &outline, progress)?)
+}
+
+fn solve<C: CasterSearch + Occlusion>(
+    scene: &Scene,
+    tracer: Tracer<'_, C>,
+    outline: &Outline,
+    progress: &(dyn Fn(f32) -> ControlFlow<()> + Sync),
+) -> Result<Reference, Cancelled> {
+    let Tracer { casters, light, gbuffer, settings, magnitude } = tracer;
     let tree = casters.tree().filter(|_| settings.skip);
-    let whole = outline.around(light);
     let solver = Solver {
         prover: tree.map(|tree| Prover::new(tree, light, gbuffer, magnitude)),
-        tracer: Tracer { casters, light, gbuffer, settings, magnitude },
+        tracer,
         gatherer: Gatherer {
             scene,
             casters,
-            outline: LightOutline::new(&whole, farthest_seen(gbuffer), magnitude),
+            representative: weld(scene.positions()).representative,
+            outline,
+            hull: LightOutline::new(&outline.around(light), farthest_seen(gbuffer), magnitude),
             magnitude,
         },
-        outline,
     };
     let begin = |x, y, thread: &mut Thread| thread.tile = Some([x, y]);
-    Ok(estimate_tiles(scene, light, gbuffer, progress, Thread::default, begin, |pixel, thread, work| {
+    estimate_tiles(scene, light, gbuffer, progress, Thread::default, begin, |pixel, thread, work| {
         if let Some([x, y]) = thread.tile.take() {
             solver.tile(x, y, thread, work);
         }
         let (x, y) = (pixel as u32 % gbuffer.width % TILE, pixel as u32 / gbuffer.width % TILE);
         thread.found[(y * TILE + x) as usize]
-    })?)
+    })
 }
 
 /// The largest coordinates of what is seen.
@@ -120,7 +135,6 @@ struct Solver<'a, C> {
     prover: Option<Prover<'a>>,
     tracer: Tracer<'a, C>,
     gatherer: Gatherer<'a, C>,
-    outline: Outline,
 }
 
 impl<C: CasterSearch + Occlusion> Solver<'_, C> {
@@ -164,10 +178,10 @@ impl<C: CasterSearch + Occlusion> Solver<'_, C> {
         }
         self.gatherer.each(receivers, TILE, &mut |receiver, patch| {
             let place = (receiver.at[1] * TILE + receiver.at[0]) as usize;
-            found[place] = match self.exactly(receiver, patch, areas) {
-                Some(visibility) => {
+            found[place] = match self.by_outlines(receiver, patch, areas) {
+                Some(estimate) => {
                     work.exact += 1;
-                    Estimate::certain(visibility)
+                    estimate
                 }
                 None => {
                     work.sampled += 1;
@@ -178,16 +192,16 @@ impl<C: CasterSearch + Occlusion> Solver<'_, C> {
     }
 
     /// V of a pixel that sees the light through the patch; `None` if it hangs on masks.
-    fn exactly(&self, receiver: &Receiver, patch: &Patch, buffers: &mut Buffers) -> Option<f32> {
+    fn by_outlines(&self, receiver: &Receiver, patch: &Patch, buffers: &mut Buffers) -> Option<Estimate> {
         let position = self.tracer.gbuffer.position[receiver.pixel];
-        let cone = Cone::new(&self.outline, receiver.origin, position, receiver.normal);
+        let cone = Cone::new(self.gatherer.outline, receiver.origin, position, receiver.normal);
         if cone.seen_area.is_nan() || cone.seen_area <= 0.0 {
-            return Some((cone.seen_area / cone.area()) as f32);
+            return Some(Estimate::certain((cone.seen_area / cone.area()) as f32));
         }
         let seen = patch.seen(&cone, buffers);
         let (most, least) = (seen.most / cone.area(), seen.least / cone.area());
         let v = if most <= SAME { 0.0 } else { most.min(1.0) };
-        (most - least <= SAME).then_some(v as f32)
+        (most - least <= SAME).then_some(Estimate::certain(v as f32))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use glam::Affine3A;
 
+use super::apexes::Apexes;
 use super::oracle::UnionArea;
 use super::*;
 use crate::bvh::{Bvh, HalfSpace};
@@ -196,19 +197,29 @@ fn oracle_and_patch(scene: &Scene, light: &Light, gbuffer: &GBuffer) -> Vec<[f64
     let outline = Outline::new(light).unwrap();
     let magnitude = scene.bounds().magnitude();
     let casters: Vec<u32> = (0..scene.triangles().len() as u32).collect();
-    let patch = Patch::new(scene, &casters);
+    let representative = weld(scene.positions()).representative;
+    let patch = |apexes: Option<Apexes>| Patch::new(scene, &representative, &casters, apexes.as_ref());
     let (mut union, mut buffers) = (UnionArea::default(), Buffers::default());
-    (0..gbuffer.pixel_count())
-        .filter(|&pixel| gbuffer.is_seen(pixel))
-        .map(|pixel| {
+    let seen: Vec<usize> = (0..gbuffer.pixel_count()).filter(|&pixel| gbuffer.is_seen(pixel)).collect();
+    let origin = |pixel: usize| shadow_origin(gbuffer.position[pixel], gbuffer.normal[pixel], magnitude);
+    // From one point alone, from a row of neighbours, and from all together.
+    let all = patch(Apexes::new(&outline, seen.iter().map(|&pixel| origin(pixel))));
+    let rows =
+        seen.chunks(5).map(|row| (row, patch(Apexes::new(&outline, row.iter().map(|&pixel| origin(pixel))))));
+    let asked = patch(None);
+    rows.flat_map(|(row, patch)| row.iter().map(move |&pixel| (pixel, patch.clone())))
+        .map(|(pixel, row)| {
             let (position, normal) = (gbuffer.position[pixel], gbuffer.normal[pixel]);
-            let cone = Cone::new(&outline, shadow_origin(position, normal, magnitude), position, normal);
+            let cone = Cone::new(&outline, origin(pixel), position, normal);
             union.clear();
             for index in 0..scene.triangles().len() {
                 union.add(cone.shadow_on_outline(scene.corners(index)));
             }
             let hidden = if cone.seen_area > 0.0 { union.area() } else { 0.0 };
-            let seen = patch.seen(&cone, &mut buffers).most;
+            let seen = row.seen(&cone, &mut buffers).most;
+            for other in [&all, &asked].map(|patch| patch.seen(&cone, &mut buffers).most) {
+                assert!((seen - other).abs() < 1e-10 * cone.area(), "{seen} {other}");
+            }
             [(cone.seen_area - hidden) / cone.area(), seen / cone.area()]
         })
         .collect()
