@@ -125,9 +125,14 @@ pub(crate) struct TruthArgs {
     pub(crate) samples: u32,
     /// Compute the visible part of the light's area without sampling: slow, and free of noise
     ///
-    /// For rect and disk lights and those without extent; behind cut-out masks still by samples.
+    /// For rect and disk lights, suns up to 1.3° in radius and lights without extent; behind cut-out masks still by samples.
     #[arg(long)]
     pub(crate) exact: bool,
+    /// Take as many samples a pixel as a standard error of about E takes, at most --samples
+    ///
+    /// std_error.npy says what each pixel reached.
+    #[arg(long, value_name = "E", conflicts_with = "exact", value_parser = parse_fraction)]
+    pub(crate) max_error: Option<f32>,
 }
 
 /// `gnomon compare`.
@@ -162,7 +167,7 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_enum, value_name = "BACKEND", value_delimiter = ',', default_value = "auto")]
     pub(crate) backend: Vec<Backend>,
     /// Error at which the error maps saturate
-    #[arg(long, value_name = "E", default_value_t = 0.5, value_parser = parse_error_scale)]
+    #[arg(long, value_name = "E", default_value_t = 0.5, value_parser = parse_fraction)]
     pub(crate) error_scale: f32,
     /// Folder to write to [default: out/NAME, by the scene]
     #[arg(long, value_name = "DIR")]
@@ -236,6 +241,7 @@ Examples:
   gnomon reference cornell --out out/truth
   gnomon reference dragon.obj --samples 1024 --size 512x512 --out out/dragon-truth
   gnomon reference quads --exact --out out/exact
+  gnomon reference knot --max-error 0.005 --samples 4096 --out out/knot-truth
 
 Writes image.png, visibility.png and report.json as `render` does, and NumPy arrays: visibility.npy and \
 std_error.npy (float32, H×W: V and the standard error of each pixel's V, NaN where nothing is seen), valid.npy \
@@ -389,7 +395,7 @@ fn parse_time(text: &str) -> Result<f32, String> {
         .ok_or_else(|| "give seconds, such as 1.5".to_owned())
 }
 
-fn parse_error_scale(text: &str) -> Result<f32, String> {
+fn parse_fraction(text: &str) -> Result<f32, String> {
     let in_range = |scale: &f32| (0.001..=1.0).contains(scale);
     text.parse().ok().filter(in_range).ok_or_else(|| "give a number from 0.001 to 1".to_owned())
 }

@@ -4,7 +4,9 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 use scene_core::bvh::Bvh;
-use scene_core::reference::{Reference, ReferenceSettings, exact_reference, reference, valid_pixels};
+use scene_core::reference::{
+    Reference, ReferenceSettings, adaptive_reference, exact_reference, reference, valid_pixels,
+};
 use scene_core::{GBuffer, Report, VisibilityImage};
 use serde_json::json;
 
@@ -42,7 +44,14 @@ pub(crate) fn trace(
 ) -> Result<(GroundTruth, RunReport), CliError> {
     let a_pixel = count_of(args.samples as usize, "sample") + " a pixel";
     let mut settings = json!({ "samples": args.samples, "seed": seed });
-    let variant = if args.exact { "exact".to_owned() } else { a_pixel.clone() };
+    let variant = match args.max_error {
+        _ if args.exact => "exact".to_owned(),
+        Some(error) => format!("to an error of {error}, at most {a_pixel}"),
+        None => a_pixel.clone(),
+    };
+    if let Some(error) = args.max_error {
+        settings["max_error"] = json!(error);
+    }
     let (scene, light) = (&view.setup.scene, view.light());
     let mut report = Report::default();
     let start = Instant::now();
@@ -62,6 +71,9 @@ pub(crate) fn trace(
         let sampling = ReferenceSettings { samples: args.samples, seed, skip: true };
         if args.exact {
             return Ok(exact_reference(scene, &bvh, light, gbuffer, &sampling, &progress)?);
+        }
+        if let Some(max_error) = args.max_error {
+            return Ok(adaptive_reference(scene, &bvh, light, gbuffer, &sampling, max_error, &progress)?);
         }
         Ok(reference(scene, &bvh, light, gbuffer, &sampling, &progress)?)
     })?;

@@ -52,7 +52,8 @@ fn load(path: &Path, count: usize) -> Option<Vec<f32>> {
 fn hash(view: &View, args: &TruthArgs, seed: u64) -> u64 {
     let mut hasher = DefaultHasher::new();
     let scene = &view.setup.scene;
-    (env!("CARGO_PKG_VERSION"), args.samples, args.exact, seed).hash(&mut hasher);
+    (env!("CARGO_PKG_VERSION"), args.samples, args.exact, args.max_error.map(f32::to_bits), seed)
+        .hash(&mut hasher);
     for position in scene.positions() {
         position.to_array().map(f32::to_bits).hash(&mut hasher);
     }

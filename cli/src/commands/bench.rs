@@ -184,7 +184,7 @@ impl<'a> Site<'a> {
         console: &Console,
     ) -> Result<Self, CliError> {
         let gbuffer = render_gbuffer(&view.setup.scene, &view.setup.camera);
-        let truth_args = TruthArgs { samples: args.samples, exact: false };
+        let truth_args = TruthArgs { samples: args.samples, exact: false, max_error: None };
         let folder = args.truth.clone().unwrap_or_else(|| args.out.join("truth"));
         let truth = truth_cache::truth(view, &gbuffer, &truth_args, args.seed, &folder, console)?;
         let shading = Shading::new(&gbuffer, &view.setup.camera, view.light());

@@ -46,6 +46,8 @@ fn usage() {
         (with(&["--backend", "abacus"]), "abacus"),
         (vec!["render", "quads", "--technique", "nonesuch", "--out", "out"], "no technique 'nonesuch'"),
         (vec!["reference", "quads", "--samples", "0", "--out", "out"], "--samples"),
+        (vec!["reference", "quads", "--max-error", "0", "--out", "out"], "from 0.001 to 1"),
+        (vec!["reference", "quads", "--max-error", "0.1", "--exact", "--out", "out"], "--exact"),
         (vec!["reference", "knot", "--exact", "--size", "8x8", "--out", "out"], "not this sphere light"),
         (vec!["compare", "quads", "--techniques", "nonesuch"], "no technique 'nonesuch'"),
         (vec!["compare", "quads", "--techniques", "shadow-map@nonesuch"], "no preset 'nonesuch'"),

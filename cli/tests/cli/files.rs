@@ -120,6 +120,21 @@ fn reference_writes_values_that_belong_together() {
 }
 
 #[test]
+fn truth_to_an_error_reaches_it_with_fewer_samples() {
+    let bench = Workbench::new();
+    let command = ["reference", "layers", "--size", "48x36", "--out"];
+    bench.done(&[&command[..], &["exact", "--exact"]].concat());
+    bench.done(&[&command[..], &["found", "--max-error", "0.02", "--samples", "4096"]].concat());
+    let (_, exact) = bench.npy::<f32>("exact/visibility.npy");
+    let (_, found) = bench.npy::<f32>("found/visibility.npy");
+    let seen: Vec<usize> = (0..exact.len()).filter(|&pixel| !exact[pixel].is_nan()).collect();
+    let partly = seen.iter().filter(|&&pixel| exact[pixel] > 0.0 && exact[pixel] < 1.0).count() as f32;
+    let squares: f32 = seen.iter().map(|&pixel| (found[pixel] - exact[pixel]).powi(2)).sum();
+    assert!(partly > 50.0 && (squares / partly).sqrt() < 0.02, "{squares} {partly}");
+    assert_eq!(bench.json("found/report.json")["settings"]["max_error"], 0.02_f32);
+}
+
+#[test]
 fn exact_truth_is_what_sampled_truth_tends_to() {
     let bench = Workbench::new();
     let command = ["reference", "quads", "--size", "32x24", "--out"];

@@ -101,6 +101,12 @@ pub(super) struct Tracer<'a, O> {
     pub(super) magnitude: f32,
 }
 
+impl Scratch {
+    pub(super) fn proofs(&mut self) -> &mut Memory {
+        &mut self.proofs
+    }
+}
+
 impl<O: Occlusion> Tracer<'_, O> {
     /// V of a pixel by its samples.
     pub(super) fn pixel(&self, pixel: usize, scratch: &mut Scratch, work: &mut Work) -> Estimate {
