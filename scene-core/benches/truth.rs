@@ -1,15 +1,18 @@
-//! Ground truth at 256 samples a pixel: every sample traced, against pixels proved lit or dark left out.
+//! Ground truth at 256 samples a pixel: every sample of every pixel traced ray by ray, the same in packets, and pixels
+//! proved lit or dark left out. How many million rays a second each traces, and how many times as fast the last is.
 //!
 //! All built-in scenes, and those of `../shared/scenes/cases` where that folder exists; arguments pick those whose
 //! name holds one of them, name scene files to measure instead (`*.json`), or set the picture's width (a number). One thread; processor time where the
-//! system tells, the least of two interleaved runs. Both ways must give the same image, bit for bit.
+//! system tells, the least of two interleaved runs. All must give the same image, bit for bit.
 
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 
+use glam::Vec3;
 use gnomon_scene_core::bvh::Bvh;
-use gnomon_scene_core::reference::{ReferenceSettings, no_progress, reference};
+use gnomon_scene_core::light::LightPoint;
+use gnomon_scene_core::reference::{Occlusion, Reference, ReferenceSettings, no_progress, reference};
 use gnomon_scene_core::{SceneSetup, io, raster, scenes};
 
 /// Seconds this thread has spent on a processor, where the system tells: other programs do not disturb it.
@@ -25,47 +28,57 @@ fn time<R>(run: impl FnOnce() -> R) -> (f64, R) {
     (processor_seconds().zip(processor).map_or(wall, |(end, start)| end - start), result)
 }
 
+/// Whether each light sample of a pixel is blocked, one ray at a time: what tracing costs without packets.
+struct Singly<'a>(&'a Bvh);
+
+impl Occlusion for Singly<'_> {
+    fn occluded_from(&self, origin: Vec3, targets: &[LightPoint], blocked: &mut [bool]) {
+        for (&target, blocked) in targets.iter().zip(blocked) {
+            *blocked = self.0.is_occluded(origin, target);
+        }
+    }
+}
+
 fn row(name: &str, mut setup: SceneSetup, width: u32) {
     let aspect = f64::from(setup.camera.height) / f64::from(setup.camera.width);
     setup.camera.width = width;
     setup.camera.height = (f64::from(width) * aspect).round().max(1.0) as u32;
     let gbuffer = raster::render_gbuffer(&setup.scene, &setup.camera);
     let bvh = Bvh::casters(&setup.scene);
-    let light = &setup.lights[0];
-    let run = |skip| {
-        let settings = ReferenceSettings { samples: 256, seed: 0, skip };
-        time(|| {
-            reference(&setup.scene, &bvh, light, &gbuffer, &settings, &no_progress).expect("not cancelled")
-        })
-    };
-    let (mut least, mut truths) = ([f64::INFINITY; 2], [None, None]);
+    let (scene, light) = (&setup.scene, &setup.lights[0]);
+    let settings = |skip| ReferenceSettings { samples: 256, seed: 0, skip };
+    let (mut least, mut truths) = ([f64::INFINITY; 3], [None, None, None]);
     for _ in 0..2 {
-        for (i, skip) in [false, true].into_iter().enumerate() {
-            let (seconds, truth) = run(skip);
-            least[i] = least[i].min(seconds);
-            truths[i] = Some(truth);
+        for way in 0..3 {
+            let (seconds, truth) = time(|| match way {
+                0 => reference(scene, &Singly(&bvh), light, &gbuffer, &settings(false), &no_progress),
+                1 => reference(scene, &bvh, light, &gbuffer, &settings(false), &no_progress),
+                _ => reference(scene, &bvh, light, &gbuffer, &settings(true), &no_progress),
+            });
+            least[way] = least[way].min(seconds);
+            truths[way] = truth.ok();
         }
     }
-    let [Some(plain), Some(skipping)] = truths else { return };
-    let bits = |truth: &gnomon_scene_core::reference::Reference| {
-        truth.visibility.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
-    };
-    assert!(bits(&plain) == bits(&skipping), "{name}: leaving out changes nothing");
-    let all = plain.work.sampled.max(1) as f64;
+    let [Some(singly), Some(packets), Some(skipping)] = truths else { return };
+    let bits = |truth: &Reference| truth.visibility.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    assert!(bits(&singly) == bits(&packets), "{name}: packets change nothing");
+    assert!(bits(&packets) == bits(&skipping), "{name}: leaving out changes nothing");
+    let all = packets.work.sampled.max(1) as f64;
     let share = |count: u64| 100.0 * count as f64 / all;
-    let partly = plain.visibility.values.iter().filter(|&&v| v > 0.0 && v < 1.0).count() as u64;
-    let dark = plain.visibility.values.iter().filter(|&&v| v == 0.0).count() as u64;
+    let partly = packets.visibility.values.iter().filter(|&&v| v > 0.0 && v < 1.0).count() as u64;
+    let mega_rays = |way: usize| packets.work.rays as f64 * 1e-6 / least[way];
     println!(
-        "| {name:20} | {:11} | {:7.2} | {:7.2} | {:5.1} | {:5.1} | {:5.1} | {:5.1} | {:5.1} | {:5.1} |",
+        "| {name:20} | {:11} | {:7.3} | {:5.1} | {:5.1} | {:5.1} | {:5.1} | {:5.1} | {:5.1} | {:5.1} | {:5.1} |",
         light.kind(),
         least[0],
-        least[1],
-        least[0] / least[1],
+        mega_rays(0),
+        mega_rays(1),
+        least[0] / least[2],
+        least[1] / least[2],
         share(skipping.work.proved_lit),
         share(skipping.work.proved_dark),
         share(skipping.work.sampled),
         share(partly),
-        share(dark),
     );
 }
 
@@ -81,9 +94,9 @@ fn main() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     pool.install(|| {
         println!(
-            "| scene                | light       | all s   | skip s  | times | lit % | dark% | rest% | V in (0,1) % | V = 0 % |"
+            "| scene                | light       | singly s | Mrays/s singly | in packets | skip / singly | skip / packets | lit % | dark % | rest % | V in (0,1) % |"
         );
-        println!("|---|---|--:|--:|--:|--:|--:|--:|--:|--:|");
+        println!("|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
         for scene in scenes::all().iter().filter(|scene| picked(scene.name)) {
             match scenes::build(scene.name, 0.0) {
                 Ok(setup) => row(scene.name, setup, width),
