@@ -20,13 +20,14 @@ use crate::cascades::{self, MAX_CASCADES, Samples};
 use crate::cpu;
 use crate::light_maps::{LightMaps, ShadowMapView};
 use crate::light_views::LightView;
+use crate::params::HARD_REACH;
 use crate::receiver_plane::plane_tolerance;
 use crate::view_casters::looked_up_behind;
 use crate::{PreparedVariant, ShadowMapParams};
 
 /// How far a window reaches beyond its samples, in texels: a sample on the rim is looked up at a texel's centre, half
 /// a texel off at most; the other half is for rounding.
-const BORDER: f32 = 1.0;
+pub(crate) const BORDER: f32 = 1.0;
 
 /// The variant, for a directional light.
 #[derive(Debug)]
@@ -43,6 +44,22 @@ pub(crate) struct Cascaded<'a> {
     tolerance: f32,
 }
 
+/// The casters that are drawn, told apart from backdrops, and their bounds in the light's axes.
+pub(crate) fn drawn_bounds<'a>(
+    scene: &'a Scene,
+    light: &Light,
+    tolerance: f32,
+    axes: Mat3,
+) -> (Backdrops<'a>, Aabb) {
+    let casters = relevance::told_apart(scene, light, tolerance);
+    let light_from_world = axes.transpose();
+    let of = |object: &&Object| {
+        Aabb::from_points(scene.positions()[object.vertices.clone()].iter().map(|&p| light_from_world * p))
+    };
+    let bounds = casters.drawn.par_iter().map(of).reduce(|| Aabb::EMPTY, Aabb::union);
+    (casters, bounds)
+}
+
 impl<'a> Cascaded<'a> {
     /// What holds for any camera; `None` for a light at a place.
     pub(crate) fn new(
@@ -55,17 +72,7 @@ impl<'a> Cascaded<'a> {
         let tolerance = plane_tolerance(scene.bounds(), light);
         let (x, y) = to_light.any_orthonormal_pair();
         let axes = Mat3::from_cols(x, y, to_light);
-        let (casters, bounds) = report.time("prepare.views", |_| {
-            let casters = relevance::told_apart(scene, light, tolerance);
-            let light_from_world = axes.transpose();
-            let of = |object: &&Object| {
-                Aabb::from_points(
-                    scene.positions()[object.vertices.clone()].iter().map(|&p| light_from_world * p),
-                )
-            };
-            let bounds = casters.drawn.par_iter().map(of).reduce(|| Aabb::EMPTY, Aabb::union);
-            (casters, bounds)
-        });
+        let (casters, bounds) = report.time("prepare.views", |_| drawn_bounds(scene, light, tolerance, axes));
         report.skip("casters", casters.backdrops.len() as u64);
         let chunks = report.time("prepare.chunks", |_| {
             if params.skip { CasterChunks::new(scene) } else { CasterChunks::default() }
@@ -105,7 +112,8 @@ impl<'a> Cascaded<'a> {
             let ranges: Vec<Range<usize>> = if self.params.skip && !views.is_empty() {
                 report.time("shade.relevance", |report| {
                     let receivers = Receivers::within(self.scene, &boxes(cascade), &self.light);
-                    let region = looked_up_behind(self.scene, &self.light, &receivers, &views, size, 0.0);
+                    let region =
+                        looked_up_behind(self.scene, &self.light, &receivers, &views, size, HARD_REACH);
                     let kept = relevance::relevant_casters(self.scene, &region, &self.chunks, |id| {
                         let object = &objects[id as usize];
                         !self.casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))

@@ -11,6 +11,11 @@ use scene_core::geometry::Aabb;
 /// Cascades at most.
 pub const MAX_CASCADES: usize = 8;
 
+/// A depth rounded to 2⁻¹² of itself: backends that raise to powers with other last digits split at the same place.
+fn rounded(depth: f32) -> f32 {
+    f32::from_bits((depth.to_bits() + 0x800) & 0xffff_f000)
+}
+
 /// Depths at which `near` to `far` splits into `count` parts of equal ratio: where each part ends, the last at `far`.
 /// A range that is empty or does not begin above 0 has all of its ends at `far`.
 pub fn splits(near: f32, far: f32, count: usize) -> Vec<f32> {
@@ -18,7 +23,7 @@ pub fn splits(near: f32, far: f32, count: usize) -> Vec<f32> {
     let ratio = f64::from(far) / f64::from(near);
     let inner = (1..count).map(|i| {
         let depth = f64::from(near) * ratio.powf(i as f64 / count as f64);
-        if near > 0.0 && ratio.is_finite() { depth as f32 } else { far }
+        if near > 0.0 && ratio.is_finite() { rounded(depth as f32) } else { far }
     });
     inner.chain([far]).collect()
 }

@@ -24,7 +24,8 @@ impl LightMaps<'_> {
             rises_above(occluder.point, point, normal, tolerance + snapping)
                 && is_behind(corners, point, light, tolerance)
                 && (!is_near(occluder.point, point, normal, light, occluder.texel)
-                    || meets(corners, point, light))
+                    || meets(corners, point, light)
+                    || self.meets_beside(point, tolerance))
         });
         if shadowed { 0.0 } else { 1.0 }
     }

@@ -7,7 +7,7 @@ use scene_core::geometry::Object;
 use scene_core::light::LightPoint;
 use scene_core::raster::DepthMap;
 use scene_core::relevance::{self, Backdrops, RelevantCasters};
-use scene_core::{Light, Report, Scene};
+use scene_core::{GBuffer, Light, Report, Scene};
 
 use crate::ShadowMapParams;
 use crate::cpu;
@@ -23,6 +23,16 @@ pub struct ShadowMapView {
     pub map: DepthMap,
     /// The triangle seen, as an index into [`Scene::triangles`].
     pub triangles: Vec<u32>,
+}
+
+impl ShadowMapView {
+    /// Column and row of normalised device coordinates within the map. Row 0 is on top, as in every image; NDC 1 belongs to
+    /// the last texel.
+    #[inline]
+    fn texel(&self, ndc: Vec2) -> [usize; 2] {
+        let (size, last) = (self.map.width as f32, self.map.width as usize - 1);
+        [ndc.x * 0.5 + 0.5, 0.5 - ndc.y * 0.5].map(|at| ((at * size) as usize).min(last))
+    }
 }
 
 /// The maps of one light.
@@ -107,15 +117,33 @@ impl<'a> LightMaps<'a> {
     pub fn occluder(&self, receiver: Vec3) -> Option<Occluder> {
         let (map, ndc) = self.maps.iter().find_map(|m| m.view.project(receiver).map(|ndc| (m, ndc)))?;
         let (size, count) = (map.map.width as f32, map.map.width as usize);
-        // Row 0 is on top, as in every image. NDC 1 belongs to the last texel.
-        let column = (((ndc.x * 0.5 + 0.5) * size) as usize).min(count - 1);
-        let row = (((0.5 - ndc.y * 0.5) * size) as usize).min(count - 1);
+        let [column, row] = map.texel(ndc);
         let depth = map.map.depth[row * count + column];
         let center = Vec2::new(column as f32 + 0.5, row as f32 + 0.5) * (2.0 / size);
         (depth > 0.0).then(|| Occluder {
             point: map.view.unproject(Vec2::new(center.x - 1.0, 1.0 - center.y), depth),
             triangle: map.triangles[row * count + column] as usize,
             texel: map.view.half_diagonal(depth) * (2.0 / size),
+        })
+    }
+
+    /// Whether one of the triangles that the light sees around the receiver's texel crosses the receiver's own ray.
+    #[cold]
+    pub fn meets_beside(&self, receiver: Vec3, tolerance: f32) -> bool {
+        let found = self.maps.iter().find_map(|m| m.view.project(receiver).map(|ndc| (m, ndc)));
+        found.is_some_and(|(map, ndc)| {
+            let (last, light) = (map.map.width as usize - 1, self.light.center());
+            let [column, row] = map.texel(ndc);
+            let around = |at: usize| at.saturating_sub(1)..=(at + 1).min(last);
+            around(row).any(|row| {
+                around(column).any(|column| {
+                    let triangle = map.triangles[row * (last + 1) + column];
+                    triangle != GBuffer::NOTHING && {
+                        let corners = self.scene.corners(triangle as usize);
+                        is_behind(corners, receiver, light, tolerance) && meets(corners, receiver, light)
+                    }
+                })
+            })
         })
     }
 

@@ -12,14 +12,19 @@
 //! that costs is contact: a caster nearer to its receiver than twice the plane's rise within half a window is lost.
 //!
 //! # Rounding
-//! Sums are made in f64 and stored in f32, so the matrix of moments (entries within ±1) is off by at most
-//! 3·2⁻²⁴ in norm. A share of α = 2⁻²⁰ of a distribution with moments (0, ½, 0, ½) adds α·0.19 to its
-//! least eigenvalue, 0.19 being that distribution's own: 3·2⁻²⁴ < 0.19·2⁻²⁰, so it stays positive.
+//! What is kept of a window is its mean depth and its *central* moments, about that mean, and windows are joined about their
+//! common mean (Pébay, *Formulas for robust, one-pass parallel computation of covariances and arbitrary-order statistical
+//! moments*, 2008). Powers of depths themselves would cancel: of a window that spans a thousandth of the map's depths the
+//! fourth moment has 10⁻¹² to tell from numbers near 1. So f32 will do, here and on a GPU, and the bound is as sharp near a contact
+//! as anywhere: it is taken in units of the window's own spread.
+//!
+//! A sum of up to 65 terms of one sign is off by 65·2⁻²⁴ of itself, and a moment is made of two such sums: below 2⁻¹⁶. The matrix of
+//! moments is made that much more positive, which moves V by about the root of it, 2⁻⁸.
 //!
 //! Limits: leaks light where more than two surfaces lie over each other in a window; the blur is as many texels wide
 //! everywhere.
 
-use glam::{DVec4, Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 use scene_core::{GBuffer, Report, VisibilityImage};
 
@@ -30,8 +35,12 @@ use crate::light_views::Unprojection;
 use crate::params::ShadowMapParams;
 use crate::texel_plane::TexelPlane;
 
-/// Share of the distribution that keeps the matrix of moments positive; derived in the module's text.
-const MOMENT_BIAS: f64 = 1.0 / 1_048_576.0;
+/// What keeps the matrix of moments positive, as a share of it: derived in the module's text.
+const MOMENT_BIAS: f32 = 1.0 / 65_536.0;
+
+/// The spread that rounding alone gives to depths in [−1, 1]: 2⁻²¹, eight roundings. A receiver is compared two of them nearer to the
+/// light than it is: of a window that holds one depth, its own, nothing is before it then.
+const LEAST_SPREAD: f32 = 1.0 / 2_097_152.0;
 
 /// The variant: blurred moments beside the maps.
 #[derive(Debug)]
@@ -47,7 +56,7 @@ pub(crate) struct Moments<'a> {
 #[derive(Clone, Debug)]
 struct MomentMap {
     side: usize,
-    moments: Vec<[f32; 4]>,
+    moments: Vec<Window>,
     depths: DepthScale,
 }
 
@@ -127,10 +136,10 @@ impl<'a> Moments<'a> {
         let reach = 0.5 * (self.window + 1.0);
         let plane = TexelPlane::new(&map.view, map.map.width, receiver);
         let nearest = plane.nearest([at.x - reach, at.y - reach], [at.x + reach, at.y + reach]);
-        let depth = f64::from(moments.depths.scaled(nearest.min(f32::MAX)));
-        let b = moments.between_texels(at);
-        let shadow = if self.four { shadow_of_four(b, depth) } else { shadow_of_two(b, depth) };
-        let stretched = (1.0 - shadow as f32 - self.light_bleeding) / (1.0 - self.light_bleeding);
+        let depth = moments.depths.scaled(nearest.min(f32::MAX));
+        let window = moments.between_texels(at);
+        let shadow = if self.four { window.shadow_by_four(depth) } else { window.shadow_by_two(depth) };
+        let stretched = (1.0 - shadow - self.light_bleeding) / (1.0 - self.light_bleeding);
         // What is not a number comes of a receiver that is not finite.
         stretched.clamp(0.0, 1.0)
     }
@@ -154,24 +163,20 @@ impl MomentMap {
                 *value = depth_at(maps, view, &depths, at(column), at(row));
             }
         });
-        let powers = |z: f32| {
-            let z = f64::from(z);
-            DVec4::new(z, z * z, z * z * z, z * z * z * z)
-        };
-        let share = 1.0 / window as f64;
+        let share = 1.0 / window as f32;
         // Along rows, then along columns.
-        let mut lines = vec![DVec4::ZERO; side * wide];
+        let mut lines = vec![Window::default(); side * wide];
         lines.par_chunks_mut(side).zip(scaled.par_chunks(wide)).for_each(|(line, scaled)| {
-            for (column, sum) in line.iter_mut().enumerate() {
-                let window = scaled[column..].iter().take(2 * half + 1).enumerate();
-                *sum = window.map(|(step, &z)| powers(z) * weight(step)).sum::<DVec4>() * share;
+            for (column, joined) in line.iter_mut().enumerate() {
+                let depth = |step: usize| Window::of(scaled[column + step]);
+                *joined = Window::joined((0..=2 * half).map(|step| (weight(step) * share, depth(step))));
             }
         });
-        let mut moments = vec![[0.0f32; 4]; side * side];
+        let mut moments = vec![Window::default(); side * side];
         moments.par_chunks_mut(side).enumerate().for_each(|(row, line)| {
-            for (column, moment) in line.iter_mut().enumerate() {
-                let window = (0..=2 * half).map(|step| lines[(row + step) * side + column] * weight(step));
-                *moment = (window.sum::<DVec4>() * share).as_vec4().to_array();
+            for (column, joined) in line.iter_mut().enumerate() {
+                let window = |step: usize| lines[(row + step) * side + column];
+                *joined = Window::joined((0..=2 * half).map(|step| (weight(step) * share, window(step))));
             }
         });
         Self { side, moments, depths }
@@ -179,18 +184,85 @@ impl MomentMap {
 
     /// Moments at a place in texels, 0 at the centre of the first, linear between centres.
     #[inline]
-    fn between_texels(&self, at: Vec2) -> DVec4 {
+    fn between_texels(&self, at: Vec2) -> Window {
         let at = (at + 1.0).clamp(Vec2::ZERO, Vec2::splat(self.side as f32 - 1.0));
         let first = at.floor().min(Vec2::splat(self.side as f32 - 2.0));
-        let fraction = (at - first).as_dvec2();
+        let b = at - first;
+        let a = 1.0 - b;
         let index = first.y as usize * self.side + first.x as usize;
-        let moment = |index: usize| {
-            let [a, b, c, d] = self.moments[index].map(f64::from);
-            DVec4::new(a, b, c, d)
-        };
-        let upper = moment(index).lerp(moment(index + 1), fraction.x);
-        let lower = moment(index + self.side).lerp(moment(index + self.side + 1), fraction.x);
-        upper.lerp(lower, fraction.y)
+        let window = |beside: usize| self.moments[index + beside];
+        Window::joined(
+            [
+                (a.x * a.y, window(0)),
+                (b.x * a.y, window(1)),
+                (a.x * b.y, window(self.side)),
+                (b.x * b.y, window(self.side + 1)),
+            ]
+            .into_iter(),
+        )
+    }
+}
+
+/// Depths in a window: their mean, and the means of the second to fourth power of what they are above it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Window {
+    mean: f32,
+    second: f32,
+    third: f32,
+    fourth: f32,
+}
+
+impl Window {
+    /// One depth.
+    #[inline]
+    fn of(mean: f32) -> Self {
+        Self { mean, ..Self::default() }
+    }
+
+    /// Windows together, by weights whose sum is 1.
+    #[inline]
+    fn joined(parts: impl Iterator<Item = (f32, Self)> + Clone) -> Self {
+        let mean = parts.clone().map(|(weight, part)| weight * part.mean).sum::<f32>();
+        let about_mean = parts.map(|(weight, part)| {
+            let d = part.mean - mean;
+            let fourth = part.fourth + d * (4.0 * part.third + d * (6.0 * part.second + d * d));
+            let third = part.third + d * (3.0 * part.second + d * d);
+            weight * Vec4::new(0.0, part.second + d * d, third, fourth)
+        });
+        let sums = about_mean.sum::<Vec4>();
+        Self { mean, second: sums.y, third: sums.z, fourth: sums.w }
+    }
+
+    /// The least shadow at `depth` of any distribution with this mean and spread: Chebyshev's inequality.
+    fn shadow_by_two(&self, depth: f32) -> f32 {
+        let above = (depth - 2.0 * LEAST_SPREAD - self.mean).max(0.0);
+        above * above / (self.second + LEAST_SPREAD * LEAST_SPREAD + above * above)
+    }
+
+    /// The least shadow at `depth` of any distribution with these moments. It has three points, one of them `depth`; the
+    /// others are the roots of the polynomial that the inverse of the matrix of moments gives.
+    ///
+    /// With x the depth, s and k the third and fourth moment in units of the spread the matrix is (1 0 1; 0 1 s; 1 s k), its
+    /// last pivot d = k − 1 − s², and the polynomial times d has the coefficients that are taken here.
+    fn shadow_by_four(&self, depth: f32) -> f32 {
+        let variance = self.second + LEAST_SPREAD * LEAST_SPREAD;
+        let spread = variance.sqrt();
+        let x = (depth - 2.0 * LEAST_SPREAD - self.mean) / spread;
+        let s = self.third / (variance * spread);
+        let k = self.fourth / (variance * variance);
+        let d = (k - 1.0 - s * s).max(0.0) + MOMENT_BIAS * (1.0 + s * s);
+        let c3 = x * x - 1.0 - s * x;
+        let c2 = x * d - s * c3;
+        let c1 = d - c3;
+        // Roots of c1 + c2·r + c3·r²; where c3 vanishes the first is at infinity, and its reciprocal is taken.
+        let root = (c2 * c2 - 4.0 * c1 * c3).max(0.0).sqrt();
+        let q = -0.5 * (c2 + root.copysign(c2));
+        let (first, over_first, second) = (q / c3, c3 / q, c1 / q);
+        // The weight of each point is the mean of Lagrange's polynomial that is 1 there and 0 at the others.
+        let kept = |at: f32, weight: f32| if at < x && weight.is_finite() { weight } else { 0.0 };
+        let of_first = kept(first, (x * second + 1.0) / ((first - x) * (first - second)));
+        let of_second = kept(second, (x + over_first) / ((second - x) * (second * over_first - 1.0)));
+        (of_first + of_second).clamp(0.0, 1.0)
     }
 }
 
@@ -209,39 +281,6 @@ fn depth_at(maps: &LightMaps<'_>, view: usize, depths: &DepthScale, column: i32,
     // Any place on the line from the light will do: half of the way to where the nearest depth is 1.
     let beside = maps.occluder(map.view.unproject(ndc, 0.5));
     beside.map_or(1.0, |occluder| depths.scaled(map.view.depth_of(occluder.point)))
-}
-
-/// The least shadow at `depth` of any distribution with the first two moments of `b`: Chebyshev's inequality.
-fn shadow_of_two(b: DVec4, depth: f64) -> f64 {
-    let above = depth - b.x;
-    let variance = (b.y - b.x * b.x).max(0.0) + 0.5 * MOMENT_BIAS;
-    if above > 0.0 { above * above / (variance + above * above) } else { 0.0 }
-}
-
-/// The least shadow at `depth` of any distribution with the four moments `b`. It has three points, one of them `depth`;
-/// the others are the roots of the polynomial that the inverse of the matrix of moments gives.
-fn shadow_of_four(b: DVec4, depth: f64) -> f64 {
-    let b = b.lerp(DVec4::new(0.0, 0.5, 0.0, 0.5), MOMENT_BIAS);
-    let z = depth;
-    // Cholesky: the matrix (1 b1 b2; b1 b2 b3; b2 b3 b4) = L·D·Lᵀ, times c = (1, z, z²).
-    let d2 = b.y - b.x * b.x;
-    let l32 = (b.z - b.x * b.y) / d2;
-    let d3 = b.w - b.y * b.y - l32 * l32 * d2;
-    let y2 = z - b.x;
-    let y3 = z * z - b.y - l32 * y2;
-    let c3 = y3 / d3;
-    let c2 = y2 / d2 - l32 * c3;
-    let c1 = 1.0 - b.x * c2 - b.y * c3;
-    // Roots of c1 + c2·x + c3·x²; where c3 vanishes the second is at infinity and weighs nothing.
-    let root = (c2 * c2 - 4.0 * c1 * c3).max(0.0).sqrt();
-    let q = -0.5 * (c2 + root.copysign(c2));
-    let (x1, x2) = (q / c3, c1 / q);
-    // The weight of each point is the mean of Lagrange's polynomial that is 1 there and 0 at the others.
-    let weight = |x: f64, other: f64| {
-        let weight = (z * other - b.x * (z + other) + b.y) / ((x - z) * (x - other));
-        if x < z && weight.is_finite() { weight } else { 0.0 }
-    };
-    (weight(x1, x2) + weight(x2, x1)).clamp(0.0, 1.0)
 }
 
 impl PreparedVariant for Moments<'_> {
@@ -266,19 +305,21 @@ impl PreparedVariant for Moments<'_> {
 mod tests {
     use super::*;
 
-    fn moments_of(points: &[(f64, f64)]) -> DVec4 {
-        points.iter().map(|&(z, w)| DVec4::new(z, z * z, z.powi(3), z.powi(4)) * w).sum()
+    fn window_of(points: &[(f32, f32)]) -> Window {
+        Window::joined(points.iter().map(|&(z, weight)| (weight, Window::of(z))))
     }
 
-    /// Two depths are what four moments can tell exactly; the bias moves V by the order of its square root.
+    /// Two depths are what four moments can tell exactly; the bias moves V by the order of its square root. So it is however
+    /// close they lie.
     #[test]
     fn two_depths_are_exact() {
-        for share in [0.1, 0.5, 0.8] {
-            let b = moments_of(&[(-0.6, share), (0.7, 1.0 - share)]);
-            assert!((shadow_of_four(b, 0.7) - share).abs() < 2e-3, "{share}: {}", shadow_of_four(b, 0.7));
-            assert!((shadow_of_two(b, 0.7) - share).abs() < 2e-3);
-            assert_eq!(shadow_of_two(b, -0.6), 0.0);
-            assert!(shadow_of_four(b, -0.6) < 2e-3);
+        for (share, gap) in [(0.1, 1.3), (0.5, 1.3), (0.8, 1.3), (0.3, 1e-3), (0.7, 1e-3)] {
+            let window = window_of(&[(0.5 - gap, share), (0.5, 1.0 - share)]);
+            let (two, four) = (window.shadow_by_two(0.5), window.shadow_by_four(0.5));
+            assert!((four - share).abs() < 8e-3, "{share}, {gap}: {four}");
+            assert!((two - share).abs() < 4e-3, "{share}, {gap}: {two}");
+            assert_eq!(window.shadow_by_two(0.5 - gap), 0.0);
+            assert!(window.shadow_by_four(0.5 - gap) < 8e-3);
         }
     }
 
@@ -286,14 +327,44 @@ mod tests {
     #[test]
     fn shadow_is_a_lower_bound() {
         let points = [(-0.9, 0.2), (-0.2, 0.3), (0.1, 0.1), (0.8, 0.4)];
-        let b = moments_of(&points);
-        for step in 0..=200 {
-            let z = -1.0 + 0.01 * f64::from(step);
-            let nearer: f64 = points.iter().filter(|point| point.0 < z).map(|point| point.1).sum();
-            // Three times the square root of the bias: the step of a distribution may move by that.
-            let (two, four) = (shadow_of_two(b, z), shadow_of_four(b, z));
-            assert!(four <= nearer + 3e-3 && two <= nearer + 3e-3, "{z}: {two} {four} {nearer}");
+        let window = window_of(&points);
+        for step in 0..=200u8 {
+            let z = -1.0 + 0.01 * f32::from(step);
+            let nearer: f32 = points.iter().filter(|point| point.0 < z).map(|point| point.1).sum();
+            // Twice the square root of the bias: the step of a distribution may move by that.
+            let (two, four) = (window.shadow_by_two(z), window.shadow_by_four(z));
+            assert!(four <= nearer + 8e-3 && two <= nearer + 8e-3, "{z}: {two} {four} {nearer}");
             assert!((0.0..=1.0).contains(&four));
+        }
+    }
+
+    /// Windows of windows are the window of all: the moments of 9 depths, in rows of 3.
+    #[test]
+    fn windows_join() {
+        let depths: Vec<f32> = (0..9u8).map(|i| f32::from(i * i) * 0.01 - 0.3).collect();
+        let third = 1.0 / 3.0;
+        let row = |row: &[f32]| Window::joined(row.iter().map(|&z| (third, Window::of(z))));
+        let rows: Vec<_> = depths.chunks(3).map(row).collect();
+        let joined = Window::joined(rows.into_iter().map(|row| (third, row)));
+        let mean = depths.iter().sum::<f32>() / 9.0;
+        let central = |power: i32| depths.iter().map(|z| (z - mean).powi(power)).sum::<f32>() / 9.0;
+        for (found, expected) in [
+            (joined.mean, mean),
+            (joined.second, central(2)),
+            (joined.third, central(3)),
+            (joined.fourth, central(4)),
+        ] {
+            assert!((found - expected).abs() < 1e-6, "{found} for {expected}");
+        }
+    }
+
+    /// Of one depth nothing before it is in shadow, and everything behind it is.
+    #[test]
+    fn one_depth_is_a_step() {
+        let window = window_of(&[(0.25, 1.0)]);
+        for (z, expected) in [(0.2499, 0.0), (0.25, 0.0), (0.2501, 1.0)] {
+            assert!((window.shadow_by_four(z) - expected).abs() < 1e-3, "{}", window.shadow_by_four(z));
+            assert!((window.shadow_by_two(z) - expected).abs() < 1e-3);
         }
     }
 }

@@ -19,6 +19,7 @@ use crate::cpu;
 use crate::light_maps::{LightMaps, ShadowMapView};
 use crate::light_points::{light_points, weight};
 use crate::light_views::light_views;
+use crate::params::HARD_REACH;
 use crate::receiver_plane::plane_tolerance;
 use crate::view_casters::looked_up_behind;
 use crate::{PreparedVariant, ShadowMapParams};
@@ -74,7 +75,9 @@ impl<'a> MultiView<'a> {
         report: &mut Report,
         mut shade: impl FnMut(&LightMaps<'a>, LightPoint, &mut Report),
     ) {
-        let points = light_points(&self.light, bounds, self.params.views, self.params.seed);
+        // Of the whole scene, so that points stay where they are when the camera moves.
+        let seen_from = self.scene.bounds().union(bounds);
+        let points = light_points(&self.light, seen_from, self.params.views, self.params.seed);
         let mut scratch = RasterScratch::new();
         let mut maps: Vec<ShadowMapView> = Vec::new();
         for point in points {
@@ -96,7 +99,8 @@ impl<'a> MultiView<'a> {
                 report.time("shade.relevance", |report| {
                     let receivers = Receivers::within(self.scene, boxes, &light);
                     let size = self.params.map_size;
-                    let region = looked_up_behind(self.scene, &light, &receivers, &views.views, size, 0.0);
+                    let region =
+                        looked_up_behind(self.scene, &light, &receivers, &views.views, size, HARD_REACH);
                     let objects = self.scene.objects();
                     let kept = relevance::relevant_casters(self.scene, &region, &self.chunks, |id| {
                         !casters.backdrops.iter().any(|b| std::ptr::eq(*b, &objects[id as usize]))

@@ -55,7 +55,7 @@ impl Variant {
 
     /// Whether it runs on a GPU, too.
     pub fn has_gpu_path(self) -> bool {
-        matches!(self, Self::Hard | Self::Pcf | Self::ObjectId | Self::Pcss)
+        self != Self::MultiView
     }
 
     /// The name in settings and reports.
@@ -117,6 +117,10 @@ pub struct ShadowMapParams {
     pub view_dependent: bool,
 }
 
+/// Texels beside its own that a hard lookup reads: [`LightMaps::meets_beside`](crate::light_maps::LightMaps::meets_beside)
+/// asks the next ones, whose centres are up to one and a half away from the receiver, one more than its own's.
+pub(crate) const HARD_REACH: f64 = 1.0;
+
 impl ShadowMapParams {
     /// The settings that presets are told apart from.
     const DEFAULT: Self = Self {
@@ -141,14 +145,15 @@ impl ShadowMapParams {
 
     /// Whether cube faces without casters may be left out: a filter looks from them into those beside.
     pub(crate) fn skips_faces(&self) -> bool {
-        self.skip && self.reach_texels() == Some(0.0)
+        self.skip
+            && !matches!(self.variant, Variant::Pcf | Variant::ObjectId | Variant::Pcss | Variant::Moments)
     }
 
     /// How many texels beside a receiver's own its lookup reads at most; `None` if that depends on more than the
     /// settings.
     pub(crate) fn reach_texels(&self) -> Option<f64> {
         match self.variant {
-            Variant::Hard => Some(0.0),
+            Variant::Hard => Some(HARD_REACH),
             Variant::Pcss | Variant::Moments => None,
             Variant::Cascaded | Variant::MultiView | Variant::AliasFree => None,
             Variant::Pcf | Variant::ObjectId => Some(f64::from(self.filter) * 0.5 + 2.0),

@@ -15,7 +15,8 @@
 //! light. So a third question follows where it matters:
 //!
 //! 3. *Is the stored point near the receiver*, nearer than a surface rises within a texel? Then the stored
-//!    triangle is asked outright, by the receiver's own ray.
+//!    triangle is asked outright, by the receiver's own ray, and if that misses it those in the eight texels around:
+//!    where a caster's triangles are about as small as texels, the one before the receiver may be stored beside.
 //!
 //! What is lost is a caster that is nearer to its receiver than that and smaller than a texel: a contact gap of
 //! at most a texel's diagonal times 1 + tan θ along the light. Casters larger than a texel leave no gap.

@@ -73,7 +73,7 @@ fn compare(gpu: &Gpu, case: &Case<'_>) -> Agreement {
     agreement
 }
 
-/// Whether a pixel may differ: its texel holds another triangle on the GPU, or it lies on the border of texels or maps,
+/// Whether a pixel may differ: its texel or one beside holds another triangle on the GPU, or it lies on the border of texels or maps,
 /// or turns from the light by rounding.
 fn is_explained(
     maps: &PreparedShadowMap<'_>,
@@ -98,8 +98,15 @@ fn is_explained(
         return true;
     }
     let texel = place.min(glam::Vec2::splat(size - 1.0)).as_uvec2();
-    let index = (texel.y * MAP_SIZE + texel.x) as usize;
-    ids[layer][index] != maps.maps()[layer].triangles[index]
+    // Triangles beside the receiver's texel may be asked, too.
+    let last = MAP_SIZE - 1;
+    let around = |at: u32| at.saturating_sub(1)..=(at + 1).min(last);
+    around(texel.y).any(|row| {
+        around(texel.x).any(|column| {
+            let index = (row * MAP_SIZE + column) as usize;
+            ids[layer][index] != maps.maps()[layer].triangles[index]
+        })
+    })
 }
 
 /// The design's bound: at least 99.9 % of the valid pixels agree.

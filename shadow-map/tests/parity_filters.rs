@@ -93,6 +93,7 @@ fn filters_agree_on_every_kind_of_view() {
                 (Variant::Pcf, Kernel::Grid),
                 (Variant::Pcf, Kernel::PoissonDisk),
                 (Variant::ObjectId, Kernel::Grid),
+                (Variant::Moments, Kernel::Grid),
             ] {
                 check(&gpu, &Case { name, scene, camera, light }, variant(kind, kernel));
             }
@@ -127,6 +128,24 @@ fn soft_shadows_agree_under_every_kind_of_light() {
     }
 }
 
+/// Even windows, two moments, light taken for leaked.
+#[test]
+fn bounds_agree() {
+    let Some(gpu) = testing::gpu() else { return };
+    let mut setup = scenes::build("chess", 0.4).unwrap();
+    (setup.camera.width, setup.camera.height) = (160, 120);
+    let (scene, camera, light) = (&setup.scene, &setup.camera, setup.lights[0]);
+    let of = variant(Variant::Moments, Kernel::Grid);
+    for params in [
+        ShadowMapParams { filter: 8, ..of },
+        ShadowMapParams { filter: 1, ..of },
+        ShadowMapParams { filter: 9, moments: 2, ..of },
+        ShadowMapParams { light_bleeding: 0.3, ..of },
+    ] {
+        check(&gpu, &Case { name: "chess", scene, camera, light }, params);
+    }
+}
+
 /// Leaving out what is certainly lit changes no bit.
 #[test]
 fn skipping_changes_nothing() {
@@ -154,7 +173,7 @@ fn skipping_changes_nothing() {
 #[test]
 fn a_variant_without_a_gpu_path_is_an_error() {
     let Some(gpu) = testing::gpu() else { return };
-    let params = ShadowMapParams { variant: Variant::AliasFree, ..Default::default() };
+    let params = ShadowMapParams { variant: Variant::MultiView, ..Default::default() };
     let error = ShadowMapOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT).unwrap_err();
     assert!(matches!(error, TechniqueError::Unsupported { .. }), "{error}");
 }

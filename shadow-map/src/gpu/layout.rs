@@ -163,12 +163,116 @@ impl SoftUniform {
     }
 }
 
+/// `Fit` of `cascades.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct FitUniform {
+    /// The light's axes: across.
+    pub x: Vec3,
+    /// How many cascades.
+    pub count: u32,
+    /// Upwards.
+    pub y: Vec3,
+    /// Texels a side of a map.
+    pub size: f32,
+    /// Towards the light.
+    pub z: Vec3,
+    /// How far a window reaches beyond its samples, in texels.
+    pub border: f32,
+    /// Of the casters drawn, in the light's axes.
+    pub casters_min: Vec3,
+    /// Zero.
+    pub padding: u32,
+    /// The other end.
+    pub casters_max: Vec3,
+    /// Zero.
+    pub padding_2: u32,
+    /// What positions are drawn relative to, world space.
+    pub origin: Vec3,
+    /// Zero.
+    pub padding_3: u32,
+}
+
+/// `Irregular` of `irregular.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct IrregularUniform {
+    /// Across a parallel view.
+    pub x: Vec3,
+    /// Windows: 1, or the 6 faces of a cube.
+    pub windows: u32,
+    /// Upwards in a parallel view.
+    pub y: Vec3,
+    /// Cells a side of a window.
+    pub side: u32,
+    /// Largest coordinate of scene and light.
+    pub magnitude: f32,
+    /// Triangles that cast.
+    pub casters: u32,
+    /// Rows of the table of casters.
+    pub rows: u32,
+    /// Pixels a row.
+    pub width: u32,
+}
+
+/// `Row` of `irregular.wesl`: a run of triangles that cast.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct CasterRow {
+    /// How many are in the rows before.
+    pub before: u32,
+    /// The first.
+    pub first: u32,
+    /// Their object, if that is cut out.
+    pub object: u32,
+    /// 1 if it is.
+    pub has_mask: u32,
+}
+
+/// `Blur` of `prepare_moments.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct BlurUniform {
+    /// The view.
+    pub view: u32,
+    /// Texels a side of the window.
+    pub window: u32,
+    /// Half of them, rounded down.
+    pub half: u32,
+    /// Texels around the map that windows reach.
+    pub border: u32,
+    /// Texels a side of the moments.
+    pub side: u32,
+    /// Texels a side of what their windows cover.
+    pub wide: u32,
+    /// Where the view's moments begin.
+    pub start: u32,
+    /// Zero.
+    pub padding: u32,
+}
+
+/// `Bound` of `moments.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct BoundUniform {
+    /// Texels a side of the window.
+    pub window: f32,
+    /// 4 or 2.
+    pub moments: u32,
+    /// V up to which light is taken for leaked.
+    pub light_bleeding: f32,
+    /// Texels a side of the moments.
+    pub side: u32,
+}
+
 #[cfg(test)]
 mod tests {
     use scene_core::assert_layout;
 
     use super::*;
-    use crate::gpu::shaders::{HARD, PCF, PCSS, PREPARE_DEPTHS};
+    use crate::gpu::shaders::{
+        CASCADES, HARD, IRREGULAR, MOMENTS, PCF, PCSS, PREPARE_DEPTHS, PREPARE_MOMENTS,
+    };
 
     #[test]
     fn layouts_are_those_of_the_shaders() {
@@ -181,6 +285,23 @@ mod tests {
         assert_layout!(MapsUniform, HARD, "Maps", [count, tolerance, skip, layer, levels]);
         assert_layout!(LevelUniform, PREPARE_DEPTHS, "Level", [side, side_below, start, start_below]);
         assert_layout!(FilterUniform, PCF, "Filter", [side, taps, seed, by_object, radius, offsets]);
+        assert_layout!(
+            FitUniform,
+            CASCADES,
+            "Fit",
+            [x, count, y, size, z, border, casters_min, casters_max, origin]
+        );
+        assert_layout!(
+            IrregularUniform,
+            IRREGULAR,
+            "Irregular",
+            [x, windows, y, side, magnitude, casters, rows, width]
+        );
+        assert_layout!(CasterRow, IRREGULAR, "Row", [before, first, object, has_mask]);
+        // A struct of seven numbers has no padding in a shader; a uniform of it may have.
+        let (members, _) = scene_core::gpu::testing::struct_layout(PREPARE_MOMENTS, "Blur");
+        assert_eq!(members.last(), Some(&("start".to_owned(), core::mem::offset_of!(BlurUniform, start))));
+        assert_layout!(BoundUniform, MOMENTS, "Bound", [window, moments, light_bleeding, side]);
         assert_layout!(SoftUniform, PCSS, "Soft", [taps, seed, points]);
     }
 }

@@ -8,7 +8,7 @@ use scene_core::{Light, Report, relevance};
 use super::filter_maps::LevelTable;
 use super::layout::{MapsUniform, ViewUniform};
 use crate::ShadowMapParams;
-use crate::light_views::light_views;
+use crate::light_views::{LightView, light_views};
 use crate::receiver_plane::plane_tolerance;
 
 /// Draws the maps of a light, and keeps their textures and what shaders must know of them.
@@ -19,6 +19,17 @@ pub struct LightMapsOnGpu {
     layers: DepthLayers,
     maps: HeldBuffer,
     views: HeldBuffer,
+}
+
+/// What is to be drawn for a light.
+#[derive(Clone, Debug)]
+pub struct MapsPlan {
+    /// A map each.
+    pub views: Vec<LightView>,
+    /// Ranges of triangles.
+    pub casters: Vec<Range<u32>>,
+    /// [`plane_tolerance`].
+    pub tolerance: f32,
 }
 
 /// What [`LightMapsOnGpu::draw`] recorded: the first three bindings of every lookup, and how many views there are.
@@ -46,26 +57,12 @@ impl LightMapsOnGpu {
         }
     }
 
-    /// `prepare.views`, and the drawing of the maps, timed as `stage`. A light without casters has no views, and a map
-    /// that is not looked up.
-    ///
-    /// # Errors
-    /// More maps or texels than the device has.
-    pub fn draw(
-        &mut self,
-        recorder: &mut Recorder<'_>,
-        scene: &GpuScene<'_>,
-        light: &Light,
-        stage: &str,
-        report: &mut Report,
-    ) -> Result<Option<DrawnMaps>, GpuError> {
+    /// Chooses the views of `light` and what is drawn into them. Nothing is recorded.
+    pub fn plan(&self, scene: &GpuScene<'_>, light: &Light, report: &mut Report) -> MapsPlan {
         let geometry = scene.geometry_or_boxes();
         let tolerance = plane_tolerance(geometry.bounds(), light);
-        let (casters, views) = report.time("prepare.views", |_| {
-            let casters = relevance::told_apart(&geometry, light, tolerance);
-            let views = light_views(&geometry, light, &casters.drawn, self.params.skips_faces());
-            (casters, views)
-        });
+        let casters = relevance::told_apart(&geometry, light, tolerance);
+        let views = light_views(&geometry, light, &casters.drawn, self.params.skips_faces());
         report.skip("casters", casters.backdrops.len() as u64);
         report.skip("faces", views.skipped_faces);
         let is_drawn = |id: usize| {
@@ -73,18 +70,32 @@ impl LightMapsOnGpu {
             !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
         };
         let objects = scene.objects.iter().enumerate().filter(|(id, _)| is_drawn(*id));
-        let ranges: Vec<Range<u32>> = objects.map(|(_, object)| object.triangles.clone()).collect();
+        let casters = objects.map(|(_, object)| object.triangles.clone()).collect();
+        MapsPlan { views: views.views, casters, tolerance }
+    }
 
-        let count = views.views.len() as u32;
+    /// Records the drawing of the maps, timed as `stage`. A light without casters has no views, and a map that is not
+    /// looked up.
+    ///
+    /// # Errors
+    /// More maps or texels than the device has.
+    pub fn draw(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        scene: &GpuScene<'_>,
+        plan: &MapsPlan,
+        stage: &str,
+    ) -> Result<Option<DrawnMaps>, GpuError> {
+        let count = plan.views.len() as u32;
         self.layers.resize(recorder.device, self.params.map_size, count)?;
-        let projections = views.views.iter().map(|view| view.projection_from_world);
-        let targets = self.layers.targets(projections, Some(&ranges));
+        let projections = plan.views.iter().map(|view| view.projection_from_world);
+        let targets = self.layers.targets(projections, Some(&plan.casters));
         self.depth.record(recorder, stage, scene, &targets);
 
         let device = recorder.device;
         let table = LevelTable::new(self.params.map_size);
-        let maps = MapsUniform::new(count, tolerance, &self.params, &table);
-        let uniforms: Vec<_> = views.views.iter().map(ViewUniform::new).collect();
+        let maps = MapsUniform::new(count, plan.tolerance, &self.params, &table);
+        let uniforms: Vec<_> = plan.views.iter().map(ViewUniform::new).collect();
         let maps = self.maps.get(device, bytemuck::bytes_of(&maps));
         let views = self.views.get(device, bytemuck::cast_slice(&uniforms));
         Ok(self.layers.bound_ids().map(|ids| DrawnMaps { maps, views, ids, count }))

@@ -107,7 +107,8 @@ impl VariantOnGpu for Lookup {
         let mut report = Report::default();
         self.prepared = None;
         let device = recorder.device;
-        let drawn = self.maps.draw(recorder, &query.scene, query.light, "prepare.maps", &mut report)?;
+        let plan = report.time("prepare.views", |report| self.maps.plan(&query.scene, query.light, report));
+        let drawn = self.maps.draw(recorder, &query.scene, &plan, "prepare.maps")?;
         if let Some(drawn) = drawn {
             let scene = self.scene.groups(device, &query.scene);
             let mut bound = vec![drawn.maps.clone().into(), drawn.views.clone().into(), drawn.ids.clone()];

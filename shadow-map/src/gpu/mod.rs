@@ -5,8 +5,12 @@
 //! | `prepare.views` | nothing: the CPU's own code |
 //! | `prepare.maps` | the casters, the nearest triangle a texel, into a layer a view |
 //! | `prepare.filter` | the stored triangles' depths in a buffer, and the nearest of every rectangle of them |
-//! | `shade.lookup` | the questions of [`receiver_plane`](crate::receiver_plane), of one texel, for `hard` |
+//! | `shade.lookup` | the questions of [`receiver_plane`](crate::receiver_plane), of one texel, for `hard` and those that draw while shading; the bound of `moments` |
 //! | `shade.filter` | those of [`taps`](crate::taps), for `pcf`, `object-id` and `pcss` |
+//! | `prepare.moments` | the windows of `moments`, along rows and then along columns |
+//! | `shade.cascades` | where depths are split, and the projections of `cascaded` |
+//! | `shade.maps` | the maps of `cascaded` |
+//! | `shade.receivers`, `shade.casters` | the irregular z-buffer of `alias-free` |
 //!
 //! `view_dependent` is not asked here: all casters are drawn, which costs time and changes no pixel. What filters leave out
 //! is not counted: nothing is read back.
@@ -15,10 +19,13 @@
 //! of it, or rounding decides: a receiver or tap on the border of two texels, a stored point that rises above a plane by
 //! no more than the tolerance.
 
+mod alias_free;
+mod cascaded;
 pub mod filter_maps;
 pub mod layout;
 pub mod light_maps;
 mod lookup;
+mod moments;
 pub mod shaders;
 
 use std::fmt::Debug;
@@ -27,8 +34,11 @@ use scene_core::gpu::{DepthLayers, GpuError, GpuGBuffer, GpuShadowQuery, Recorde
 use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Report};
 
-use crate::ShadowMapParams;
+use crate::{ShadowMapParams, Variant};
+use alias_free::AliasFree;
+use cascaded::Cascaded;
 use lookup::Lookup;
+use moments::Moments;
 
 /// The technique on one device: pipelines, and the maps of the light prepared last.
 #[derive(Debug)]
@@ -85,7 +95,14 @@ impl ShadowMapOnGpu {
                 why: "this variant has a CPU path only".to_owned(),
             });
         }
-        Ok(Self { variant: Box::new(Lookup::new(device, params, visibility)) })
+        Ok(Self {
+            variant: match params.variant {
+                Variant::AliasFree => Box::new(AliasFree::new(device, visibility)),
+                Variant::Cascaded => Box::new(Cascaded::new(device, params, visibility)),
+                Variant::Moments => Box::new(Moments::new(device, params, visibility)),
+                _ => Box::new(Lookup::new(device, params, visibility)),
+            },
+        })
     }
 
     /// Records what depends on the query's light: the drawing of its maps. They hold for any camera, `view_dependent`
