@@ -53,11 +53,6 @@ impl Variant {
     const NAMES: &'static [&'static str] =
         &["hard", "pcf", "object-id", "pcss", "moments", "cascaded", "multi-view", "alias-free"];
 
-    /// Whether it runs on a GPU, too.
-    pub fn has_gpu_path(self) -> bool {
-        self != Self::MultiView
-    }
-
     /// The name in settings and reports.
     pub fn name(self) -> &'static str {
         match self {

@@ -47,9 +47,6 @@ impl ShadowTechnique for ShadowMap {
             Capability::Gpu if !cfg!(feature = "gpu") => {
                 Support::Unsupported("built without the feature 'gpu'")
             }
-            Capability::Gpu if !self.params.variant.has_gpu_path() => {
-                Support::Unsupported("this variant has a CPU path only")
-            }
             Capability::Gpu => Support::Exact,
         };
         Description::new(SUMMARY, support)

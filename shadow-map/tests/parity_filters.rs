@@ -12,7 +12,6 @@ use gnomon_shadow_map::{Kernel, ShadowMap, ShadowMapParams, Variant};
 use scene_core::gpu::headless::VISIBILITY_FORMAT;
 use scene_core::gpu::{Gpu, testing};
 use scene_core::reference::valid_pixels;
-use scene_core::technique::TechniqueError;
 use scene_core::{Camera, Light, Scene, VisibilityImage, raster, scenes};
 
 const MAP_SIZE: u32 = 256;
@@ -168,12 +167,4 @@ fn skipping_changes_nothing() {
             assert!(images[0].iter().any(|&v| v < 1.0) && images[0] == images[1], "{kind:?}, {light:?}");
         }
     }
-}
-
-#[test]
-fn a_variant_without_a_gpu_path_is_an_error() {
-    let Some(gpu) = testing::gpu() else { return };
-    let params = ShadowMapParams { variant: Variant::MultiView, ..Default::default() };
-    let error = ShadowMapOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT).unwrap_err();
-    assert!(matches!(error, TechniqueError::Unsupported { .. }), "{error}");
 }

@@ -1,5 +1,5 @@
-//! The GPU path of `cascaded`, whose maps are fitted to what is seen, against the CPU path: at least 99.9 % of the valid pixels
-//! within 1/255.
+//! The GPU path of the variants that draw their maps for what is seen, `cascaded` and `multi-view`, against the CPU path: at
+//! least 99.9 % of the valid pixels within 1/255.
 //!
 //! Maps are fitted or placed by arithmetic that differs in its last digits, and drawn by another rasteriser, so a shadow's
 //! edge may fall on the other side of a texel: V of every other pixel must be among the CPU's answers within a texel.
@@ -92,4 +92,26 @@ fn cascades_agree() {
     let chess = setup("chess");
     let inside = Light::Point { position: chess.scene.bounds().center() };
     check(&gpu, "chess", &chess, inside, params);
+}
+
+#[test]
+fn many_views_agree() {
+    let Some(gpu) = testing::gpu() else { return };
+    let params =
+        ShadowMapParams { variant: Variant::MultiView, views: 16, map_size: MAP_SIZE, ..Default::default() };
+    for name in ["quads", "ball", "chess", "log-cabin"] {
+        let setup = setup(name);
+        let bounds = setup.scene.bounds();
+        let size = bounds.size().max_element();
+        let above = bounds.center() + Vec3::new(0.1, 1.0, 0.2) * size;
+        let inside = bounds.center() + 0.1 * bounds.size();
+        for light in [
+            setup.lights[0],
+            Light::Sphere { center: above, radius: 0.05 * size },
+            Light::Sphere { center: inside, radius: 0.02 * size },
+            Light::Directional { direction: Vec3::new(0.4, -1.0, 0.3), angular_radius: 0.04 },
+        ] {
+            check(&gpu, name, &setup, light, params);
+        }
+    }
 }

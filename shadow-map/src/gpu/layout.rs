@@ -265,13 +265,38 @@ pub struct BoundUniform {
     pub side: u32,
 }
 
+/// `Point` of `multi_view.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct PointUniform {
+    /// Middle of the sphere that the point is on.
+    pub center: Vec3,
+    /// Its radius; 0 where all points count alike.
+    pub radius: f32,
+    /// 1 for the first point.
+    pub is_first: u32,
+    /// Zero.
+    pub padding: [u32; 3],
+}
+
+impl PointUniform {
+    /// What shaders must know of `light` to weigh a point of it.
+    pub fn new(light: &Light, is_first: bool) -> Self {
+        let (center, radius) = match *light {
+            Light::Sphere { center, radius } => (center, radius),
+            _ => (Vec3::ZERO, 0.0),
+        };
+        Self { center, radius, is_first: u32::from(is_first), padding: [0; 3] }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use scene_core::assert_layout;
 
     use super::*;
     use crate::gpu::shaders::{
-        CASCADES, HARD, IRREGULAR, MOMENTS, PCF, PCSS, PREPARE_DEPTHS, PREPARE_MOMENTS,
+        CASCADES, HARD, IRREGULAR, MOMENTS, MULTI_VIEW, PCF, PCSS, PREPARE_DEPTHS, PREPARE_MOMENTS,
     };
 
     #[test]
@@ -302,6 +327,7 @@ mod tests {
         let (members, _) = scene_core::gpu::testing::struct_layout(PREPARE_MOMENTS, "Blur");
         assert_eq!(members.last(), Some(&("start".to_owned(), core::mem::offset_of!(BlurUniform, start))));
         assert_layout!(BoundUniform, MOMENTS, "Bound", [window, moments, light_bleeding, side]);
+        assert_layout!(PointUniform, MULTI_VIEW, "Point", [center, radius, is_first]);
         assert_layout!(SoftUniform, PCSS, "Soft", [taps, seed, points]);
     }
 }

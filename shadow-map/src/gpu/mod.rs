@@ -9,7 +9,7 @@
 //! | `shade.filter` | those of [`taps`](crate::taps), for `pcf`, `object-id` and `pcss` |
 //! | `prepare.moments` | the windows of `moments`, along rows and then along columns |
 //! | `shade.cascades` | where depths are split, and the projections of `cascaded` |
-//! | `shade.maps` | the maps of `cascaded` |
+//! | `shade.maps` | the maps of `cascaded`, and of `multi-view` one after the other, each looked up at once |
 //! | `shade.receivers`, `shade.casters` | the irregular z-buffer of `alias-free` |
 //!
 //! `view_dependent` is not asked here: all casters are drawn, which costs time and changes no pixel. What filters leave out
@@ -26,6 +26,7 @@ pub mod layout;
 pub mod light_maps;
 mod lookup;
 mod moments;
+mod multi_view;
 pub mod shaders;
 
 use std::fmt::Debug;
@@ -39,6 +40,7 @@ use alias_free::AliasFree;
 use cascaded::Cascaded;
 use lookup::Lookup;
 use moments::Moments;
+use multi_view::MultiView;
 
 /// The technique on one device: pipelines, and the maps of the light prepared last.
 #[derive(Debug)]
@@ -77,7 +79,7 @@ impl ShadowMapOnGpu {
     /// Makes the pipelines. `visibility` is the format of the texture that V is written to.
     ///
     /// # Errors
-    /// A `map_size` that the device has no texture of; a variant that has no GPU path.
+    /// A `map_size` that the device has no texture of.
     pub fn new(
         device: &wgpu::Device,
         params: ShadowMapParams,
@@ -88,17 +90,11 @@ impl ShadowMapOnGpu {
             params.map_size,
             device.limits().max_texture_dimension_2d,
         )?;
-        if !params.variant.has_gpu_path() {
-            return Err(TechniqueError::Unsupported {
-                technique: ShadowMapParams::TECHNIQUE,
-                input: format!("variant={} on a GPU", params.variant.name()),
-                why: "this variant has a CPU path only".to_owned(),
-            });
-        }
         Ok(Self {
             variant: match params.variant {
                 Variant::AliasFree => Box::new(AliasFree::new(device, visibility)),
                 Variant::Cascaded => Box::new(Cascaded::new(device, params, visibility)),
+                Variant::MultiView => Box::new(MultiView::new(device, params, visibility)),
                 Variant::Moments => Box::new(Moments::new(device, params, visibility)),
                 _ => Box::new(Lookup::new(device, params, visibility)),
             },
