@@ -15,7 +15,7 @@ use super::layout::PointUniform;
 use super::light_maps::{LightMapsOnGpu, MapsPlan};
 use super::{VariantOnGpu, not_prepared, shaders};
 use crate::ShadowMapParams;
-use crate::light_points::{as_light, light_points};
+use crate::light_points::light_points;
 
 /// The variant on one device.
 #[derive(Debug)]
@@ -93,7 +93,7 @@ impl VariantOnGpu for MultiView {
             let ShadowMapParams { views, seed, .. } = self.params;
             let points = light_points(query.light, query.scene.bounds, views, seed);
             let plan = |point| {
-                let light = as_light(query.light, point);
+                let light = query.light.reduced_to(point);
                 (light, self.maps.plan(&query.scene, &light, report))
             };
             points.into_iter().map(plan).collect()
