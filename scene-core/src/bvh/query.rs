@@ -105,6 +105,7 @@ impl Bvh {
         self.occluded_ends(origin, &ends, masks[0], true) | self.occluded_ends(origin, &ends, masks[1], false)
     }
 
+    #[expect(clippy::manual_map, reason = "a closure would be compiled apart, without the vector unit")]
     fn occluded_ends<const N: usize>(
         &self,
         origin: Vec3,
@@ -118,7 +119,6 @@ impl Bvh {
         if !Shaft::can_reach(origin, self.tree.bounds) {
             return self.occluded_slowly(origin, ends, mask, finite);
         }
-        // No closure around the walk: it would be compiled apart, without the vector unit.
         let blocked = dispatch!(self.level, simd => {
             match Shaft::new(simd, origin, ends, mask, finite) {
                 Some((shaft, rays)) => {
