@@ -41,9 +41,9 @@ fn shade(scene: &Scene, light: &Light, gbuffer: &GBuffer, params: ShadowMapParam
     visibility
 }
 
-/// V from which a pixel counts as lit.
-fn lit_from(params: &ShadowMapParams) -> f32 {
-    if params.variant == Variant::Moments { 1.0 - 1.0 / 255.0 } else { 1.0 }
+/// Whether V counts as lit.
+fn is_lit(params: &ShadowMapParams, v: f32) -> bool {
+    v >= if params.variant == Variant::Moments { 1.0 - 1.0 / 255.0 } else { 1.0 }
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -87,7 +87,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                     let on_ground = |gbuffer: &GBuffer, pixel: usize| gbuffer.object[pixel] == 0;
                     for pixel in (0..seen_plane.pixel_count()).filter(|&p| on_ground(&seen_plane, p)) {
                         counts[0][0] += 1;
-                        counts[0][1] += usize::from(!(image.values[pixel] >= lit_from(&params)));
+                        counts[0][1] += usize::from(!is_lit(&params, image.values[pixel]));
                     }
                     let image = shade(&shadow, &light, &seen_shadow, params);
                     let shift = direction * (height / tilt.cos());
@@ -100,7 +100,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                         let outside = on_caster.x.abs().max(on_caster.z.abs()) - scale;
                         let v = image.values[pixel];
                         let is_right = if outside > reach {
-                            v >= lit_from(&params)
+                            is_lit(&params, v)
                         } else {
                             outside >= -reach || v == 0.0 || params.variant == Variant::Moments
                         };

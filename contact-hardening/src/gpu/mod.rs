@@ -189,9 +189,8 @@ impl ContactHardeningOnGpu {
         let mut report = Report::default();
         self.prepared = None;
         let device = recorder.device;
-        if let Some(drawn) =
-            self.maps.draw(recorder, &query.scene, query.light, "prepare.maps", &mut report)?
-        {
+        let plan = report.time("prepare.views", |report| self.maps.plan(&query.scene, query.light, report));
+        if let Some(drawn) = self.maps.draw(recorder, &query.scene, &plan, "prepare.maps")? {
             let scene = self.scene.groups(device, &query.scene);
             let depths = self.filter.record(recorder, &drawn, &scene.triangles)?;
             self.prepared = Some(Prepared {
