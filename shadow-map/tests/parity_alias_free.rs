@@ -76,8 +76,7 @@ fn check(gpu: &Gpu, name: &str, scene: &Scene, camera: &Camera, light: &Light) -
                     .find(|&pixels| within(pixels));
                 panic!(
                     "{name}, {light:?}: pixel {pixel} is {got}, not {wanted}, and the next border is {near:?} pixels away; \
-                     the light is seen at a cosine of {}",
-                    cosine
+                     the light is seen at a cosine of {cosine}"
                 );
             }
         }
