@@ -6,13 +6,14 @@ use crate::error::CliError;
 use crate::source::OnAnySource;
 
 /// Every technique, in the order of the tables.
-pub(crate) fn all() -> [&'static dyn TechniqueFactory; 6] {
+pub(crate) fn all() -> [&'static dyn TechniqueFactory; 7] {
     [
         &gnomon_shadow_map::Factory,
         &gnomon_psm::Factory,
         &gnomon_stencil_volumes::Factory,
         &gnomon_penumbra_wedges::Factory,
         &gnomon_pdsm::Factory,
+        &gnomon_ddoc::Factory,
         &OnAnySource(&gnomon_contact_hardening::Factory),
     ]
 }

@@ -92,6 +92,12 @@ impl LightCone {
         self.share_axis().dot(point - self.receiver)
     }
 
+    /// The matrix that turns a point, counted from the receiver, into (a, b, t).
+    #[inline]
+    pub fn light_from_receiver(&self) -> Mat3 {
+        self.light_from_world
+    }
+
     /// Whether a point with these coordinates lies in the cone, on the light's side of the receiver.
     #[inline]
     pub fn contains(&self, located: Vec3) -> bool {

@@ -1,0 +1,347 @@
+//! Step 4: V of a receiver from the edges around it.
+//!
+//! From the receiver p every edge is projected onto the light, in the coordinates (a, b, t) of
+//! [`LightCone`]: a point of the light is (a/t, b/t). The number of faces before the light's
+//! point s is that before its centre c, and what the edges add that the segment from c to s crosses:
+//!
+//! > n(s) = n(c) + Σ m(e)·o·([s left of e] − [c left of e]),
+//!
+//! where o = −1 if (u, v, w) is right-handed and +1 otherwise: seen from p, along w, a turn from u to v is clockwise in a
+//! right-handed frame, so left as p sees it ([`silhouettes`](crate::silhouettes)) is right in (a, b). V is the share of the
+//! light's points with n(s) = 0.
+//!
+//! The segment crosses the edge (A, B) if A and B lie on different sides of the line through c and s, and c and s on
+//! different sides of the line through A and B. The first is asked of a vertex, in the same way for all edges at it, so
+//! that no segment slips through between two. In homogeneous coordinates, c = (0, 0, 1), both are determinants, and no
+//! division is needed: det(c, s, A) = s_x·A_y − s_y·A_x, and (A × B)·(s, 1).
+//!
+//! Edges count as far as they lie above the receiver's plane (below, they are its own surface, and the light is above) and
+//! before the light. They are cut there.
+
+use fearless_simd::Simd;
+use glam::{Mat3, Vec2, Vec3};
+use gnomon_shadow_map::light_cone::LightCone;
+
+use crate::silhouettes::Edge;
+
+/// Lanes that the compiler is given to fill.
+const LANES: usize = 16;
+
+/// Edges of a tile, component by component.
+#[derive(Debug, Default)]
+pub struct TileEdges {
+    /// a, b, the two planes, the two signs; the point seen past the edge.
+    parts: [Vec<f32>; 19],
+    count: usize,
+    has_far: bool,
+}
+
+impl TileEdges {
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.parts.iter_mut().for_each(Vec::clear);
+        (self.count, self.has_far) = (0, false);
+    }
+
+    /// Adds an edge.
+    pub fn push(&mut self, edge: &Edge) {
+        let [p, q] = edge.planes.map(|plane| plane.to_array());
+        let (a, b, far) = (edge.a, edge.b, edge.far);
+        let values = [
+            a.x,
+            a.y,
+            a.z,
+            b.x,
+            b.y,
+            b.z,
+            p[0],
+            p[1],
+            p[2],
+            p[3],
+            q[0],
+            q[1],
+            q[2],
+            q[3],
+            edge.signs[0],
+            edge.signs[1],
+            far.x,
+            far.y,
+            far.z,
+        ];
+        self.has_far |= !far.is_nan();
+        self.parts.iter_mut().zip(values).for_each(|(part, value)| part.push(value));
+        self.count += 1;
+    }
+
+    /// Fills the last lanes with edges that never count.
+    pub fn pad(&mut self) {
+        let padded = self.count.next_multiple_of(LANES);
+        self.parts.iter_mut().for_each(|part| part.resize(padded, 0.0));
+    }
+
+    /// The ends of an edge.
+    #[inline]
+    pub(crate) fn ends(&self, index: usize) -> [Vec3; 2] {
+        let at = |part: usize| self.parts[part][index];
+        [Vec3::new(at(0), at(1), at(2)), Vec3::new(at(3), at(4), at(5))]
+    }
+
+    /// Edges there are.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+}
+
+/// A receiver, relative to the edges' origin, and the light over it.
+#[derive(Clone, Copy, Debug)]
+pub struct Site {
+    /// The receiver.
+    pub point: Vec3,
+    /// Unit normal on the light's side.
+    pub normal: Vec3,
+    /// Distance from its plane below which a point counts as on it.
+    pub tolerance: f32,
+    /// From a point counted from the receiver to (a, b, t).
+    light_from_receiver: Mat3,
+    /// o.
+    orientation: f32,
+    /// Whether nothing lies behind the light.
+    is_parallel: bool,
+}
+
+impl Site {
+    /// Of a receiver at `point`.
+    pub fn new(point: Vec3, normal: Vec3, tolerance: f32, cone: &LightCone, is_parallel: bool) -> Self {
+        let right_handed = cone.u.cross(cone.v).dot(cone.w) > 0.0;
+        Self {
+            point,
+            normal,
+            tolerance,
+            light_from_receiver: cone.light_from_receiver(),
+            orientation: if right_handed { -1.0 } else { 1.0 },
+            is_parallel,
+        }
+    }
+
+    /// The part of an edge, in (a, b, t), that lies above the receiver's plane, on the light's side of it and before the
+    /// light.
+    pub(crate) fn cut(&self, [a, b]: [Vec3; 2]) -> Option<[Vec3; 2]> {
+        let (from_a, from_b) = (a - self.point, b - self.point);
+        let heights = [self.normal.dot(from_a) - self.tolerance, self.normal.dot(from_b) - self.tolerance];
+        let mut ends = [self.light_from_receiver * from_a, self.light_from_receiver * from_b];
+        let keep = |by: [f32; 2], ends: &mut [Vec3; 2]| {
+            if by[0] <= 0.0 && by[1] <= 0.0 {
+                return false;
+            }
+            if by[0] <= 0.0 || by[1] <= 0.0 {
+                let cut = ends[0].lerp(ends[1], by[0] / (by[0] - by[1]));
+                ends[usize::from(by[1] <= 0.0)] = cut;
+            }
+            true
+        };
+        if !keep(heights, &mut ends) || !keep([ends[0].z, ends[1].z], &mut ends) {
+            return None;
+        }
+        if !self.is_parallel && !keep([1.0 - ends[0].z, 1.0 - ends[1].z], &mut ends) {
+            return None;
+        }
+        Some(ends)
+    }
+}
+
+/// Points of the light and what is counted at them; memory that is kept from receiver to receiver.
+#[derive(Debug, Default)]
+pub struct Counter {
+    /// The points' a and b.
+    xs: Vec<f32>,
+    ys: Vec<f32>,
+    /// n(s) − n(c).
+    counts: Vec<f32>,
+    /// m(e) of the edges that may lie over the light, 0 of the others.
+    marks: Vec<f32>,
+    /// Edges that were cut and counted for the last receiver.
+    pub counted: u32,
+}
+
+impl Counter {
+    /// Takes the points of the light for the receivers to come.
+    pub fn set_points(&mut self, points: impl Iterator<Item = Vec2>) {
+        self.xs.clear();
+        self.ys.clear();
+        for point in points {
+            self.xs.push(point.x);
+            self.ys.push(point.y);
+        }
+        let padded = self.xs.len().next_multiple_of(LANES);
+        // Copies of the last point: they change no least count.
+        let last = (self.xs.last().copied().unwrap_or(0.0), self.ys.last().copied().unwrap_or(0.0));
+        self.xs.resize(padded, last.0);
+        self.ys.resize(padded, last.1);
+    }
+
+    /// The share of the first `taps` points before which no face lies, if `at_center` lie before the centre.
+    ///
+    /// Counts below 0 would be a contradiction: `at_center` was found too small, and is raised.
+    #[inline(always)]
+    pub fn visible<S: Simd>(
+        &mut self,
+        simd: S,
+        site: &Site,
+        edges: &TileEdges,
+        at_center: i32,
+        taps: usize,
+    ) -> f32 {
+        self.count(simd, site, edges);
+        let least = self.counts.iter().copied().fold(0.0, f32::min);
+        let clear = -(at_center as f32).max(-least);
+        let seen = self.counts[..taps].iter().map(|&count| u32::from(count == clear)).sum::<u32>();
+        seen as f32 / taps as f32
+    }
+
+    #[inline(always)]
+    fn count<S: Simd>(&mut self, _simd: S, site: &Site, edges: &TileEdges) {
+        self.counts.clear();
+        self.counts.resize(self.xs.len(), 0.0);
+        self.counted = 0;
+        self.mark(site, edges);
+        for index in 0..edges.count {
+            let mark = self.marks[index];
+            if mark == 0.0 {
+                continue;
+            }
+            if let Some([a, b]) = site.cut(edges.ends(index)) {
+                self.counted += 1;
+                let line = a.cross(b);
+                let center_left = line.z > 0.0;
+                let step = mark * site.orientation * if center_left { -1.0 } else { 1.0 };
+                let taps = self.xs.chunks_exact(LANES).zip(self.ys.chunks_exact(LANES));
+                for ((xs, ys), counts) in taps.zip(self.counts.chunks_exact_mut(LANES)) {
+                    for lane in 0..LANES {
+                        let (x, y) = (xs[lane], ys[lane]);
+                        let sides = ((x * a.y - y * a.x) < 0.0) != ((x * b.y - y * b.x) < 0.0);
+                        let left = (line.x * x + line.y * y + line.z) > 0.0;
+                        let crossed = sides & (left != center_left);
+                        counts[lane] += if crossed { step } else { 0.0 };
+                    }
+                }
+            }
+        }
+    }
+
+    /// Finds the edges that may lie over the light: m(e) ≠ 0, not below the receiver's plane, and not beside the square
+    /// around the light. All tests are linear, so they are asked of the ends.
+    #[inline(always)]
+    fn mark(&mut self, site: &Site, edges: &TileEdges) {
+        let padded = edges.count.next_multiple_of(LANES);
+        self.marks.clear();
+        self.marks.resize(padded, 0.0);
+        let Site { point, normal, tolerance, .. } = *site;
+        let m = site.light_from_receiver.transpose();
+        for first in (0..padded).step_by(LANES) {
+            let part = |i: usize| &edges.parts[i][first..first + LANES];
+            let [ax, ay, az, bx, by, bz] = [0, 1, 2, 3, 4, 5].map(part);
+            let [px, py, pz, pd, qx, qy, qz, qd] = [6, 7, 8, 9, 10, 11, 12, 13].map(part);
+            let (p_sign, q_sign) = (part(14), part(15));
+            let [fx, fy, fz] = [16, 17, 18].map(part);
+            let marks = &mut self.marks[first..first + LANES];
+            for lane in 0..LANES {
+                let side = |x: f32, y: f32, z: f32, d: f32, sign: f32| {
+                    let at = x * point.x + y * point.y + z * point.z + d;
+                    if at >= 0.0 { sign } else { -sign }
+                };
+                let multiplicity = side(px[lane], py[lane], pz[lane], pd[lane], p_sign[lane])
+                    + side(qx[lane], qy[lane], qz[lane], qd[lane], q_sign[lane]);
+                let a = Vec3::new(ax[lane] - point.x, ay[lane] - point.y, az[lane] - point.z);
+                let b = Vec3::new(bx[lane] - point.x, by[lane] - point.y, bz[lane] - point.z);
+                let dot = |axis: Vec3, v: Vec3| axis.x * v.x + axis.y * v.y + axis.z * v.z;
+                let above = dot(normal, a).max(dot(normal, b)) > tolerance;
+                let [au, av, at] = [m.x_axis, m.y_axis, m.z_axis].map(|axis| dot(axis, a));
+                let [bu, bv, bt] = [m.x_axis, m.y_axis, m.z_axis].map(|axis| dot(axis, b));
+                let beside = ((au > at) & (bu > bt))
+                    | ((-au > at) & (-bu > bt))
+                    | ((av > at) & (bv > bt))
+                    | ((-av > at) & (-bv > bt));
+                let mut counts = above & !beside;
+                if edges.has_far {
+                    let far = Vec3::new(fx[lane] - point.x, fy[lane] - point.y, fz[lane] - point.z);
+                    // NaN does not rise.
+                    counts &= !(dot(normal, far) > tolerance);
+                }
+                marks[lane] = if counts { multiplicity } else { 0.0 };
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fearless_simd::{Level, dispatch};
+    use glam::Vec4;
+    use scene_core::Light;
+
+    const LIGHT: Light = Light::Rect { center: Vec3::new(0.0, 4.0, 0.0), half_u: Vec3::X, half_v: Vec3::Z };
+
+    /// An open edge along z at (x, 1, ·) of a face that reaches to −∞: 1 face left of it as the ground sees it.
+    fn half_plane(x: f32) -> Edge {
+        // The face's normal points down: seen from the ground it is counter-clockwise with +z running… the sum says it.
+        let (a, b) = (Vec3::new(x, 1.0, -50.0), Vec3::new(x, 1.0, 50.0));
+        let corners = [a, b, Vec3::new(x - 50.0, 1.0, 0.0)];
+        let plane = crate::silhouettes::plane(corners, Vec3::ZERO);
+        let planes = [plane, Vec4::ZERO];
+        Edge { a, b, planes, signs: [1.0, 0.0], from_center: 0, far: Vec3::NAN }
+    }
+
+    fn visible(point: Vec3, edges: &[Edge], at_center: i32) -> f32 {
+        let cone = LightCone::new(&LIGHT, point).unwrap();
+        let site = Site::new(point, Vec3::Y, 1e-6, &cone, false);
+        let mut tile = TileEdges::default();
+        edges.iter().for_each(|edge| tile.push(edge));
+        tile.pad();
+        let mut counter = Counter::default();
+        // Half a step inside, so that no point lies on an edge.
+        let grid = |i: u32| Vec2::new((i % 32) as f32, (i / 32) as f32) / 16.0 + (1.0 / 32.0 - 1.0);
+        counter.set_points((0..1024).map(grid));
+        dispatch!(Level::new(), simd => counter.visible(simd, &site, &tile, at_center, 1024))
+    }
+
+    /// The receiver at x under a half-plane that ends at 0: the line through the edge meets the light at −3x, so that the
+    /// part right of it is seen, V = (1 + 3x)/2; both where the centre is seen and where it is not.
+    #[test]
+    fn a_half_plane_hides_what_lies_left_of_its_edge() {
+        for x in [-0.3f32, -0.11, -0.05, 0.04, 0.21, 0.29] {
+            let v = visible(Vec3::new(x, 0.0, 0.0), &[half_plane(0.0)], i32::from(x < 0.0));
+            assert!((v - 0.5 * (1.0 + 3.0 * x)).abs() <= 1.0 / 32.0, "{x}: {v}");
+        }
+        assert_eq!(visible(Vec3::new(0.5, 0.0, 0.0), &[half_plane(0.0)], 0), 1.0);
+        assert_eq!(visible(Vec3::new(-0.5, 0.0, 0.0), &[half_plane(0.0)], 1), 0.0);
+    }
+
+    /// Two layers are two: a second one over all of the light hides what the first lets through.
+    #[test]
+    fn a_layer_without_an_edge_in_reach_hides_all() {
+        let point = Vec3::new(-0.1, 0.0, 0.0);
+        assert_eq!(visible(point, &[half_plane(0.0)], 2), 0.0);
+        // Two half-planes one over the other are as the larger.
+        let both = visible(point, &[half_plane(0.0), half_plane(0.1)], 2);
+        assert_eq!(both, visible(point, &[half_plane(0.1)], 1));
+    }
+
+    #[test]
+    fn what_lies_below_the_receiver_or_behind_the_light_does_not_count() {
+        let point = Vec3::new(0.1, 0.0, 0.0);
+        let moved = |y: f32| {
+            let mut edge = half_plane(0.0);
+            edge.a.y += y;
+            edge.b.y += y;
+            edge
+        };
+        assert_eq!(visible(point, &[moved(-1.5)], 0), 1.0);
+        assert_eq!(visible(point, &[moved(4.0)], 0), 1.0);
+    }
+}

@@ -1,0 +1,166 @@
+//! Step 1, the map, with all its layers: how many faces lie between a receiver and the light's centre.
+//!
+//! A shadow map holds the nearest surface; the umbra under one caster then hides the penumbra of another. This map holds
+//! every face over every texel's centre. A receiver is not at a texel's centre, so the count found there is carried over
+//! to the receiver by the silhouettes between the two, exactly:
+//!
+//! > n(p) = n(t) + Σ m(e)·([p left of e] − [t left of e])
+//!
+//! over the edges e that the segment from the centre t to p crosses in the image, above the receiver's plane, with m(e)
+//! as the light's centre sees it (the derivation is that of [`silhouettes`](crate::silhouettes), with the centre in the
+//! receiver's place). Coverage of t was decided on snapped vertices, so the edges are snapped, too, and a centre on an
+//! edge belongs to the side that the top-left rule gives it to.
+//!
+//! # Near the receiver
+//! Where a face lies as near to its receiver as its own surface may rise within a texel ([`is_near`]), the count at t says
+//! little about p. There the face is asked by the receiver's own ray, and edges as near are not counted: what is lost is
+//! what a hard map loses, a caster nearer to its receiver than that and not over the texel's centre.
+
+use glam::{Vec2, Vec3};
+use gnomon_shadow_map::light_maps::Receiver;
+use gnomon_shadow_map::receiver_plane::{is_behind, is_near, meets, rises_above};
+use scene_core::Scene;
+use scene_core::light::LightPoint;
+use scene_core::raster::{DEPTH_POSITION_ERROR, Fragments};
+
+use crate::light_image::LightImage;
+
+/// A view's map.
+#[derive(Clone, Debug)]
+pub struct Layers {
+    /// Where its texels are.
+    pub image: LightImage,
+    /// Every face over every texel's centre.
+    pub fragments: Fragments,
+    /// Whether the nearest alone counts, as in a plain shadow map.
+    pub single: bool,
+}
+
+/// A silhouette as the light's centre sees it, in the image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CenterEdge {
+    /// Its ends, snapped.
+    pub ends: [[f64; 2]; 2],
+    /// m(e), never 0.
+    pub multiplicity: i8,
+    /// The edge.
+    pub edge: u32,
+}
+
+/// A receiver and where it lies in a map.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed<'r> {
+    /// The receiver.
+    pub receiver: &'r Receiver,
+    /// Its place in the image.
+    pub place: Vec2,
+}
+
+impl Layers {
+    /// The texel that holds a place: column and row; `None` beside the map, where there is no caster.
+    #[inline]
+    fn texel(&self, place: Vec2) -> Option<[u32; 2]> {
+        let size = self.image.size as f32;
+        let inside = place.x >= 0.0 && place.y >= 0.0 && place.x <= size && place.y <= size;
+        // The border belongs to the last texel.
+        inside.then(|| place.to_array().map(|at| (at as u32).min(self.image.size - 1)))
+    }
+
+    /// World units of a texel's diagonal at a depth.
+    #[inline]
+    fn diagonal(&self, depth: f32) -> f32 {
+        self.image.view.half_diagonal(depth) * (2.0 / self.image.size as f32)
+    }
+
+    /// Faces between the receiver and the light's `center`, by the texel's centre alone: right where no silhouette passes
+    /// through the texel.
+    #[inline]
+    pub fn at_texel(&self, scene: &Scene, placed: &Placed<'_>, center: LightPoint) -> i32 {
+        let Some(texel) = self.texel(placed.place) else { return 0 };
+        let Receiver { point, normal, tolerance, .. } = *placed.receiver;
+        let scale = 2.0 / self.image.size as f32;
+        let middle = Vec2::from(texel.map(|at| at as f32 + 0.5)) * scale;
+        let ndc = Vec2::new(middle.x - 1.0, 1.0 - middle.y);
+        let mut count = 0;
+        let all = self.fragments.of(texel[0], texel[1]);
+        for fragment in if self.single { &all[..all.len().min(1)] } else { all } {
+            if fragment.depth <= 0.0 {
+                continue;
+            }
+            let stored = self.image.view.unproject(ndc, fragment.depth);
+            let diagonal = self.diagonal(fragment.depth);
+            if !rises_above(stored, point, normal, tolerance + diagonal * DEPTH_POSITION_ERROR) {
+                continue;
+            }
+            let corners = scene.corners(fragment.triangle as usize);
+            let counts = is_behind(corners, point, center, tolerance)
+                && (!is_near(stored, point, normal, center, diagonal) || meets(corners, point, center));
+            count += i32::from(counts);
+        }
+        count
+    }
+
+    /// What the silhouettes between the texel's centre and the receiver add to [`at_texel`](Self::at_texel). `ends` are
+    /// those of an edge and the point seen past it, in world space.
+    pub fn carried(
+        &self,
+        placed: &Placed<'_>,
+        center: LightPoint,
+        edges: &[CenterEdge],
+        ends: impl Fn(u32) -> [Vec3; 3],
+    ) -> i32 {
+        let Some(texel) = self.texel(placed.place) else { return 0 };
+        let from = texel.map(|at| f64::from(at) + 0.5);
+        let to = placed.place.to_array().map(f64::from);
+        let (low, high) = ([0, 1].map(|i| from[i].min(to[i])), [0, 1].map(|i| from[i].max(to[i])));
+        let mut sum = 0;
+        for edge in edges {
+            let [a, b] = edge.ends;
+            if (0..2).any(|i| a[i].max(b[i]) < low[i] || a[i].min(b[i]) > high[i]) {
+                continue;
+            }
+            let (a_side, b_side) = (cross(from, to, a), cross(from, to, b));
+            if (a_side >= 0.0) == (b_side >= 0.0) {
+                continue;
+            }
+            let (starts, arrives) = (right_of(a, b, from), right_of(a, b, to));
+            if starts == arrives {
+                continue;
+            }
+            // In texels a_side / (a_side − b_side) is the share of the way that the image shows; depth makes it another one
+            // in space. Both ends' distances weigh it: a central image divides by them.
+            let [a, b, far] = ends(edge.edge);
+            let weight = |end: Vec3| f64::from(self.image.weight(end));
+            let (a_share, b_share) = (a_side * weight(a), b_side * weight(b));
+            let crossed = a.lerp(b, (a_share / (a_share - b_share)).clamp(0.0, 1.0) as f32);
+            if self.counts(placed.receiver, crossed, far, center) {
+                // y runs down, so that right as the image shows it is right as the light sees it.
+                sum += i32::from(edge.multiplicity) * (i32::from(starts) - i32::from(arrives));
+            }
+        }
+        sum
+    }
+
+    /// Whether an edge at `crossed` lies above the receiver, `far` does not, and it is no part of the receiver's own surface.
+    fn counts(&self, receiver: &Receiver, crossed: Vec3, far: Vec3, center: LightPoint) -> bool {
+        let Receiver { point, normal, tolerance, .. } = *receiver;
+        let diagonal = self.diagonal(self.image.view.depth_of(crossed));
+        rises_above(crossed, point, normal, tolerance)
+            && !rises_above(far, point, normal, tolerance)
+            && !is_near(crossed, point, normal, center, diagonal)
+    }
+}
+
+/// Twice the area of (a, b, p): positive if p lies right of the way from a to b, y down. Exact of snapped points.
+#[inline]
+fn cross(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
+    (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
+}
+
+/// Whether p lies right of the way from a to b, by the rasteriser's top-left rule.
+#[inline]
+fn right_of(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> bool {
+    let value = cross(a, b, p);
+    let owns = b[1] < a[1] || (b[1] == a[1] && b[0] > a[0]);
+    value > 0.0 || (value == 0.0 && owns)
+}

@@ -1,0 +1,205 @@
+#![doc = include_str!("../README.md")]
+
+pub mod cells;
+pub mod coverage;
+pub mod cpu;
+pub mod discontinuity;
+pub mod distortion_map;
+pub mod image_edges;
+pub mod layers;
+pub mod light_image;
+mod light_points;
+pub mod mask_edges;
+pub mod outer;
+pub mod paper;
+mod params;
+pub mod silhouettes;
+pub mod splat;
+mod technique;
+pub mod tiles;
+
+use std::collections::HashSet;
+
+use glam::{Vec2, Vec3};
+use gnomon_shadow_map::cpu::receiver;
+use gnomon_shadow_map::light_maps::{LightMaps, Receiver};
+use gnomon_shadow_map::light_points::as_light;
+use gnomon_shadow_map::light_views::light_views;
+use gnomon_shadow_map::receiver_plane::plane_tolerance;
+use scene_core::geometry::{Aabb, Object, TopologyError};
+use scene_core::light::{LightHull, LightPoint};
+use scene_core::{GBuffer, Light, Report, Scene, VisibilityImage, relevance};
+
+use discontinuity::Discontinuities;
+use layers::{CenterEdge, Layers};
+use light_image::LightImage;
+pub use params::{DdocParams, Variant};
+use silhouettes::{Edge, silhouettes};
+pub use technique::Factory;
+
+/// The technique: settings, from which any number of lights can be prepared.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ddoc {
+    params: DdocParams,
+}
+
+/// One light's map and edges, borrowing the scene it shines on. Holds for any camera.
+#[derive(Debug)]
+pub struct PreparedDdoc<'a> {
+    /// The scene, the light and the tolerance; no maps.
+    base: LightMaps<'a>,
+    /// The map, a view each.
+    layers: Vec<Layers>,
+    /// Where edges are counted from.
+    origin: Vec3,
+    edges: Vec<Edge>,
+    /// The same as the light's centre sees them, a view each.
+    center_edges: Vec<Vec<CenterEdge>>,
+    /// Bounds of the light; none of a sun that is too wide.
+    hull: Option<LightHull>,
+    /// Points of the light as shares of it.
+    points: Vec<Vec2>,
+    variant: Variant,
+    skip: bool,
+}
+
+impl Ddoc {
+    /// A technique with these settings.
+    pub fn new(params: DdocParams) -> Self {
+        Self { params }
+    }
+
+    /// Draws the map of `light` and finds the edges that bound its penumbrae.
+    ///
+    /// # Errors
+    /// More triangles than edges can be counted of.
+    pub fn prepare<'a>(
+        &self,
+        scene: &'a Scene,
+        light: &Light,
+    ) -> Result<(PreparedDdoc<'a>, Report), TopologyError> {
+        let (mut report, params) = (Report::default(), &self.params);
+        let tolerance = plane_tolerance(scene.bounds(), light);
+        let center = light.center();
+        let (casters, images) = report.time("prepare.views", |_| {
+            let casters = relevance::told_apart(scene, light, tolerance);
+            // A penumbra reaches from one face of a cube into the next: none is left out.
+            let views = light_views(scene, light, &casters.drawn, false).views;
+            let images: Vec<_> =
+                views.into_iter().map(|view| LightImage::new(view, params.map_size)).collect();
+            (casters, images)
+        });
+        report.skip("casters", casters.backdrops.len() as u64);
+        let ranges: Vec<_> = casters.drawn.iter().map(|object| object.triangles.clone()).collect();
+        // What one shadow map shows.
+        let single = matches!(params.variant, Variant::ImageEdges | Variant::Paper);
+        let layers = report.time("prepare.map", |_| cpu::draw_layers(scene, &ranges, &images, single));
+        let bounds = casters.drawn.iter().fold(Aabb::EMPTY, |all, object| all.union(object.bounds));
+        let origin = if bounds.is_empty() { Vec3::ZERO } else { bounds.center() };
+        let hull = LightHull::of(light);
+        let (edges, center_edges) = report.time("prepare.silhouettes", |report| {
+            let edges = match params.variant {
+                Variant::ImageEdges | Variant::Paper => {
+                    let in_map = |layers| {
+                        let map = Discontinuities::new(scene, layers, center, tolerance);
+                        match params.variant {
+                            Variant::Paper => paper::texel_splats(&map, origin, scene.bounds()),
+                            _ => image_edges::image_edges(&map, origin),
+                        }
+                    };
+                    layers.iter().flat_map(in_map).collect()
+                }
+                Variant::Ddoc => {
+                    object_edges(scene, &casters.drawn, origin, hull.as_ref(), center, &layers, report)?
+                }
+                Variant::Smoothies | Variant::PenumbraMap => {
+                    let point = LightHull::of(&as_light(light, center));
+                    let drawn = &casters.drawn;
+                    let mut edges =
+                        object_edges(scene, drawn, origin, point.as_ref(), center, &layers, report)?;
+                    edges.retain(|edge| edge.from_center != 0);
+                    edges
+                }
+            };
+            let center_edges = cpu::center_edges(&images, &edges, origin);
+            Ok::<_, TopologyError>((edges, center_edges))
+        })?;
+        report.bytes += layers.iter().map(|layers| layers.fragments.bytes() as u64).sum::<u64>()
+            + size_of_val(&edges[..]) as u64
+            + center_edges.iter().map(|edges| size_of_val(&edges[..]) as u64).sum::<u64>();
+        let backdrops = casters.backdrops;
+        let base = LightMaps { scene, light: *light, maps: Vec::new(), backdrops, tolerance };
+        let points = light_points::light_points(light, params.taps, params.seed);
+        let DdocParams { variant, skip, .. } = *params;
+        let prepared =
+            PreparedDdoc { base, layers, origin, edges, center_edges, hull, points, variant, skip };
+        Ok((prepared, report))
+    }
+}
+
+/// The silhouettes of solid casters for any point of the light within `hull`, and the outlines of masks.
+fn object_edges(
+    scene: &Scene,
+    casters: &[&Object],
+    origin: Vec3,
+    hull: Option<&LightHull>,
+    center: LightPoint,
+    layers: &[Layers],
+    report: &mut Report,
+) -> Result<Vec<Edge>, TopologyError> {
+    let drawn: HashSet<usize> = casters.iter().map(|object| object.triangles.start).collect();
+    let found = silhouettes(scene, origin, hull, center, |object| {
+        object.alpha.is_none() && !object.triangles.is_empty() && drawn.contains(&object.triangles.start)
+    })?;
+    report.skip("edges", found.left_out);
+    let mut edges = found.edges;
+    for layers in layers {
+        edges.extend(mask_edges::mask_edges(scene, origin, layers, center));
+    }
+    Ok(edges)
+}
+
+impl PreparedDdoc<'_> {
+    /// The map, a view each.
+    pub fn layers(&self) -> &[Layers] {
+        &self.layers
+    }
+
+    /// The edges that bound penumbrae, from [`origin`](Self::origin).
+    pub fn edges(&self) -> &[Edge] {
+        &self.edges
+    }
+
+    /// Where edges are counted from, world space.
+    pub fn origin(&self) -> Vec3 {
+        self.origin
+    }
+
+    /// Fills `visibility`, which must have the G-buffer's size: V where a surface is seen, NaN elsewhere.
+    pub fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Report {
+        let mut report = Report::default();
+        cpu::shade(self, &mut visibility.values, &mut report, |pixel| receiver(&self.base, gbuffer, pixel));
+        report
+    }
+
+    /// V at free points, each answered as a small surface turned to the light's centre; NaN for a point that is not
+    /// finite. The slices must be of equal length: what the longer one has more is left alone.
+    pub fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Report {
+        let mut report = Report::default();
+        let count = points.len().min(visibility.len());
+        let (light, base) = (&self.base.light, &self.base);
+        cpu::shade(self, &mut visibility[..count], &mut report, |index| {
+            let point = points[index];
+            if !point.is_finite() {
+                return Err(f32::NAN);
+            }
+            if !light.reaches(point) || base.is_behind_backdrop(point) {
+                return Err(0.0);
+            }
+            let (to_light, _) = light.center().ray_from(point);
+            let (normal, tolerance) = (to_light.normalize_or_zero(), base.tolerance);
+            Ok(Receiver { point, normal, object: GBuffer::NOTHING, tolerance, pixel: [0; 2] })
+        });
+        report
+    }
+}

@@ -1,0 +1,97 @@
+//! The trait's implementation, nothing else.
+
+use glam::Vec3;
+use scene_core::technique::{
+    Capability, Description, Params, PreparedShadow, ShadowQuery, ShadowTechnique, Support, TechniqueError,
+    TechniqueFromParams,
+};
+use scene_core::{GBuffer, Report, VisibilityImage};
+
+use crate::{Ddoc, DdocParams, PreparedDdoc, Variant};
+
+impl ShadowTechnique for Ddoc {
+    fn name(&self) -> &'static str {
+        DdocParams::TECHNIQUE
+    }
+
+    fn describe(&self) -> Description {
+        const MASK: Support = Support::Approximate("a mask's outline is straight between the map's texels");
+        const IMAGE: Support = Support::Approximate("only what the light's centre sees throws penumbrae");
+        const PAPER: Support =
+            Support::Approximate("every penumbra is as wide as on the surface farthest down");
+        const OUTER: Support =
+            Support::Approximate("the umbra is the hard shadow: penumbrae lie outside of it");
+        let variant = self.params.variant;
+        let support = |capability| match capability {
+            Capability::Gpu => Support::Unsupported("it has a CPU path only"),
+            Capability::AlphaMask if variant == Variant::Ddoc => MASK,
+            Capability::DirectionalLight
+            | Capability::PointLight
+            | Capability::SpotLight
+            | Capability::AlphaMask
+            | Capability::TriangleSoup
+            | Capability::FreePoints => Support::Exact,
+            Capability::Sun | Capability::SphereLight | Capability::RectLight | Capability::DiskLight => {
+                match variant {
+                    Variant::Ddoc => Support::Exact,
+                    Variant::ImageEdges => IMAGE,
+                    Variant::Paper => PAPER,
+                    Variant::Smoothies | Variant::PenumbraMap => OUTER,
+                }
+            }
+        };
+        Description {
+            summary: SUMMARY,
+            support: Capability::ALL.map(|capability| (capability, support(capability))).to_vec(),
+        }
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        self.params.to_json()
+    }
+
+    fn prepare<'a>(
+        &self,
+        query: &ShadowQuery<'a>,
+    ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError> {
+        let (prepared, report) = Ddoc::prepare(self, query.scene, query.light)
+            .map_err(|error| TechniqueError::Other(Box::new(error)))?;
+        Ok((Box::new(prepared), report))
+    }
+}
+
+impl PreparedShadow for PreparedDdoc<'_> {
+    fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError> {
+        if visibility.values.len() != gbuffer.pixel_count() {
+            let (expected, got) = (gbuffer.pixel_count(), visibility.values.len());
+            return Err(TechniqueError::OutputSize { expected, got });
+        }
+        Ok(PreparedDdoc::shade(self, gbuffer, visibility))
+    }
+
+    fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Result<Report, TechniqueError> {
+        if points.len() != visibility.len() {
+            return Err(TechniqueError::OutputSize { expected: points.len(), got: visibility.len() });
+        }
+        Ok(PreparedDdoc::visibility_at(self, points, visibility))
+    }
+
+    fn survives_camera(&self) -> bool {
+        true
+    }
+}
+
+const SUMMARY: &str = "edges splatted into the light's map; inner and outer penumbrae through all layers";
+
+/// Makes [`Ddoc`]s from settings given as text.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Factory;
+
+impl TechniqueFromParams for Factory {
+    type Params = DdocParams;
+    const SUMMARY: &'static str = SUMMARY;
+
+    fn make(params: DdocParams) -> Box<dyn ShadowTechnique> {
+        Box::new(Ddoc::new(params))
+    }
+}
