@@ -209,8 +209,7 @@ impl Counter {
         self.counts.resize(self.xs.len(), 0.0);
         self.counted = 0;
         self.mark(site, edges);
-        for index in 0..edges.count {
-            let mark = self.marks[index];
+        for (index, &mark) in self.marks[..edges.count].iter().enumerate() {
             if mark == 0.0 {
                 continue;
             }
@@ -221,12 +220,11 @@ impl Counter {
                 let step = mark * site.orientation * if center_left { -1.0 } else { 1.0 };
                 let taps = self.xs.chunks_exact(LANES).zip(self.ys.chunks_exact(LANES));
                 for ((xs, ys), counts) in taps.zip(self.counts.chunks_exact_mut(LANES)) {
-                    for lane in 0..LANES {
-                        let (x, y) = (xs[lane], ys[lane]);
+                    for ((&x, &y), count) in xs.iter().zip(ys).zip(counts) {
                         let sides = ((x * a.y - y * a.x) < 0.0) != ((x * b.y - y * b.x) < 0.0);
                         let left = (line.x * x + line.y * y + line.z) > 0.0;
                         let crossed = sides & (left != center_left);
-                        counts[lane] += if crossed { step } else { 0.0 };
+                        *count += if crossed { step } else { 0.0 };
                     }
                 }
             }
@@ -249,7 +247,7 @@ impl Counter {
             let (p_sign, q_sign) = (part(14), part(15));
             let [fx, fy, fz] = [16, 17, 18].map(part);
             let marks = &mut self.marks[first..first + LANES];
-            for lane in 0..LANES {
+            for (lane, mark) in marks.iter_mut().enumerate() {
                 let side = |x: f32, y: f32, z: f32, d: f32, sign: f32| {
                     let at = x * point.x + y * point.y + z * point.z + d;
                     if at >= 0.0 { sign } else { -sign }
@@ -272,7 +270,7 @@ impl Counter {
                     // NaN does not rise.
                     counts &= !(dot(normal, far) > tolerance);
                 }
-                marks[lane] = if counts { multiplicity } else { 0.0 };
+                *mark = if counts { multiplicity } else { 0.0 };
             }
         }
     }

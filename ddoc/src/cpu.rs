@@ -220,8 +220,8 @@ impl Tile<'_, '_> {
             Variant::Paper => {
                 let edges = thread.indices.iter().map(|&edge| &prepared.edges[edge as usize]);
                 let (image, points) = (&self.layers.image, &prepared.points);
-                let hull = prepared.hull.as_ref();
-                paper::visible(light, hull, image, receiver.point, prepared.origin, edges, points, hard)
+                let light = (light, prepared.hull.as_ref());
+                paper::visible(light, image, receiver.point, prepared.origin, edges, points, hard)
             }
         }
     }

@@ -72,10 +72,9 @@ fn texel_splat(map: &Discontinuities<'_>, texel: [i32; 2], origin: Vec3, bottom:
     Some(Edge { far, ..outline(ends) })
 }
 
-/// V of a receiver at `point`, which the light's centre sees if `hard` is 1. `edges` are the splats that may reach it.
+/// V of a receiver at `point` under a light within its hull, whose centre sees it if `hard` is 1. `edges` are the splats that may reach it.
 pub fn visible<'e>(
-    light: &Light,
-    hull: Option<&LightHull>,
+    (light, hull): (&Light, Option<&LightHull>),
     image: &LightImage,
     point: Vec3,
     origin: Vec3,
