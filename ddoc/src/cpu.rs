@@ -218,7 +218,7 @@ impl Tile<'_, '_> {
             Variant::Smoothies => outer::visible(Kept::Nearest, &site, &thread.edges, hard),
             Variant::PenumbraMap => outer::visible(Kept::Darkest, &site, &thread.edges, hard),
             Variant::Paper => {
-                let edges = thread.indices.iter().map(|&edge| &prepared.edges[edge as usize]);
+                let edges = thread.indices.iter().map(|&edge| (edge, &prepared.edges[edge as usize]));
                 let (image, points) = (&self.layers.image, &prepared.points);
                 let light = (light, prepared.hull.as_ref());
                 paper::visible(light, image, receiver.point, prepared.origin, edges, points, hard)

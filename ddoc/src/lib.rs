@@ -23,7 +23,6 @@ use std::collections::HashSet;
 use glam::{Vec2, Vec3};
 use gnomon_shadow_map::cpu::receiver;
 use gnomon_shadow_map::light_maps::{LightMaps, Receiver};
-use gnomon_shadow_map::light_points::as_light;
 use gnomon_shadow_map::light_views::light_views;
 use gnomon_shadow_map::receiver_plane::plane_tolerance;
 use scene_core::geometry::{Aabb, Object, TopologyError};
@@ -113,7 +112,7 @@ impl Ddoc {
                     object_edges(scene, &casters.drawn, origin, hull.as_ref(), center, &layers, report)?
                 }
                 Variant::Smoothies | Variant::PenumbraMap => {
-                    let point = LightHull::of(&as_light(light, center));
+                    let point = LightHull::of(&center.as_light());
                     let drawn = &casters.drawn;
                     let mut edges =
                         object_edges(scene, drawn, origin, point.as_ref(), center, &layers, report)?;

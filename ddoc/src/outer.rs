@@ -8,7 +8,7 @@
 //!   α = D there is their α/(1 − b/r) of a smoothie as wide as the light is seen from the edge, so that V is 0 at contact.
 //! - Penumbra maps (Wyman and Hansen 2003) draw cones at vertices and sheets at edges; the darkest is kept.
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use crate::coverage::{Site, TileEdges};
 
@@ -32,7 +32,9 @@ pub fn visible(kept: Kept, site: &Site, edges: &TileEdges, hard: f32) -> f32 {
         let (distance, along) = from_center(ends);
         match kept {
             _ if distance >= 1.0 => {}
-            Kept::Nearest if along <= nearest => {}
+            Kept::Nearest if along < nearest => {}
+            // Of equally near ones the darker, so that the order of edges does not matter.
+            Kept::Nearest if along == nearest => v = v.min(distance),
             Kept::Nearest => (v, nearest) = (distance, along),
             Kept::Darkest => v = v.min(distance),
         }
@@ -41,17 +43,21 @@ pub fn visible(kept: Kept, site: &Site, edges: &TileEdges, hard: f32) -> f32 {
 }
 
 /// Distance of the light's centre from an edge in (a, b), and how far towards the light the nearest point is.
+///
+/// Nothing is divided by t before it must: an end cut off at the receiver's plane may be a million lights away, where the
+/// foot of the perpendicular would have no digits left.
 fn from_center([a, b]: [Vec3; 2]) -> (f32, f32) {
-    // An end cut off at the receiver is infinitely far away: a large number does.
-    let flat = |end: Vec3| Vec2::new(end.x, end.y) / end.z.max(f32::MIN_POSITIVE.sqrt());
-    let (from, to) = (flat(a), flat(b));
-    let way = to - from;
-    let share = (-from.dot(way) / way.length_squared()).clamp(0.0, 1.0);
-    let share = if share.is_nan() { 0.0 } else { share };
-    let point = from + way * share;
-    // 1/t is affine over the projected edge.
-    let inverse = (1.0 / a.z) + (1.0 / b.z - 1.0 / a.z) * share;
-    (point.length(), 1.0 / inverse)
+    let line = a.cross(b);
+    let across = line.truncate();
+    // Places along the edge from the foot, times t.
+    let (from, to) = (across.perp_dot(a.truncate()), across.perp_dot(b.truncate()));
+    if from * to < 0.0 {
+        return (line.z.abs() / across.length(), a.lerp(b, from / (from - to)).z);
+    }
+    // A t that was cut off at 0 may have been rounded below it.
+    let of = |end: Vec3| (end.truncate().length() / end.z.max(0.0), end.z);
+    let (a, b) = (of(a), of(b));
+    if a.0 <= b.0 { a } else { b }
 }
 
 #[cfg(test)]
@@ -65,5 +71,7 @@ mod tests {
         assert!((distance - 1.0).abs() < 1e-6 && (along - 1.0 / 3.0).abs() < 1e-6);
         let (distance, _) = from_center([Vec3::new(0.5, 0.5, 0.5), Vec3::new(1.0, 0.5, 0.5)]);
         assert!((distance - 2f32.sqrt()).abs() < 1e-6);
+        let (distance, _) = from_center([Vec3::new(0.5, -0.5, -1e-10), Vec3::new(0.6, -0.6, 1e-3)]);
+        assert!(distance > 100.0);
     }
 }

@@ -72,24 +72,27 @@ fn texel_splat(map: &Discontinuities<'_>, texel: [i32; 2], origin: Vec3, bottom:
     Some(Edge { far, ..outline(ends) })
 }
 
-/// V of a receiver at `point` under a light within its hull, whose centre sees it if `hard` is 1. `edges` are the splats that may reach it.
+/// V of a receiver at `point` under a light within its hull, whose centre sees it if `hard` is 1. `edges` are the splats that
+/// may reach it, in any order, with their numbers.
 pub fn visible<'e>(
     (light, hull): (&Light, Option<&LightHull>),
     image: &LightImage,
     point: Vec3,
     origin: Vec3,
-    edges: impl Iterator<Item = &'e Edge>,
+    edges: impl Iterator<Item = (u32, &'e Edge)>,
     points: &[Vec2],
     hard: f32,
 ) -> f32 {
     let (Some(place), along) = (image.place(point), image.along(point)) else { return hard };
-    let mut nearest: Option<(f32, f32)> = None;
-    for edge in edges {
+    let mut nearest: Option<(f32, u32, f32)> = None;
+    for (number, edge) in edges {
         let ends = [edge.a, edge.b].map(|end| end + origin);
         let middle = ends[0].midpoint(ends[1]);
         let Some(at) = image.place(middle) else { continue };
         let distance = at.distance_squared(place);
-        if image.along(middle) >= along || nearest.is_some_and(|(least, _)| distance >= least) {
+        // Of equally near ones the first, whatever order they come in.
+        let is_beaten = |&(least, first, _): &(f32, u32, f32)| (distance, number) >= (least, first);
+        if image.along(middle) >= along || nearest.as_ref().is_some_and(is_beaten) {
             continue;
         }
         // The receiver moved along its line to the light's centre, down to the far z.
@@ -107,8 +110,8 @@ pub fn visible<'e>(
         let seen = points.iter().filter(|&&at| open(cone.share(at))).count();
         // A splat ends where its half-plane hides all or nothing.
         if seen > 0 && seen < points.len() {
-            nearest = Some((distance, seen as f32 / points.len() as f32));
+            nearest = Some((distance, number, seen as f32 / points.len() as f32));
         }
     }
-    nearest.map_or(hard, |(_, v)| v)
+    nearest.map_or(hard, |(_, _, v)| v)
 }

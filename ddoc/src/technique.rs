@@ -40,10 +40,7 @@ impl ShadowTechnique for Ddoc {
                 }
             }
         };
-        Description {
-            summary: SUMMARY,
-            support: Capability::ALL.map(|capability| (capability, support(capability))).to_vec(),
-        }
+        Description::new(SUMMARY, support)
     }
 
     fn settings(&self) -> serde_json::Value {
@@ -62,17 +59,12 @@ impl ShadowTechnique for Ddoc {
 
 impl PreparedShadow for PreparedDdoc<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError> {
-        if visibility.values.len() != gbuffer.pixel_count() {
-            let (expected, got) = (gbuffer.pixel_count(), visibility.values.len());
-            return Err(TechniqueError::OutputSize { expected, got });
-        }
+        TechniqueError::check_output(gbuffer.pixel_count(), visibility.values.len())?;
         Ok(PreparedDdoc::shade(self, gbuffer, visibility))
     }
 
     fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Result<Report, TechniqueError> {
-        if points.len() != visibility.len() {
-            return Err(TechniqueError::OutputSize { expected: points.len(), got: visibility.len() });
-        }
+        TechniqueError::check_output(points.len(), visibility.len())?;
         Ok(PreparedDdoc::visibility_at(self, points, visibility))
     }
 
