@@ -12,13 +12,12 @@ pub fn outlines(
     mut crossing: impl FnMut(usize) -> Vec2,
 ) -> impl Iterator<Item = [Vec2; 2]> {
     let mut found = [None; 2];
-    let mut count = 0;
     // A segment begins where the set is left and ends where it is entered again, walking clockwise from corner to corner.
     // Beyond a corner i outside the square between two sides, the set lies left of the way from the side where the walk
     // leaves the set to the side where it enters.
     let leaves = |side: usize| inside[side] && !inside[(side + 1) % 4];
     let enters = |side: usize| !inside[side] && inside[(side + 1) % 4];
-    for side in (0..4).filter(|&side| enters(side)) {
+    for (found, side) in found.iter_mut().zip((0..4).filter(|&side| enters(side))) {
         // The corner entered and those after it, up to where the walk leaves.
         let mut end = (side + 1) % 4;
         while !leaves(end) {
@@ -26,8 +25,7 @@ pub fn outlines(
         }
         // The way from where the walk leaves back to where it entered closes the part of the set clockwise, so the other way
         // round has it on the left, y up: see the test.
-        found[count] = Some([crossing(side), crossing(end)]);
-        count += 1;
+        *found = Some([crossing(side), crossing(end)]);
     }
     found.into_iter().flatten()
 }

@@ -13,7 +13,7 @@
 //! The segment crosses the edge (A, B) if A and B lie on different sides of the line through c and s, and c and s on
 //! different sides of the line through A and B. The first is asked of a vertex, in the same way for all edges at it, so
 //! that no segment slips through between two. In homogeneous coordinates, c = (0, 0, 1), both are determinants, and no
-//! division is needed: det(c, s, A) = s_x·A_y − s_y·A_x, and (A × B)·(s, 1).
+//! division is needed: det(c, s, A) = s × A in the plane, and (A × B)·(s, 1).
 //!
 //! Edges count as far as they lie above the receiver's plane (below, they are its own surface, and the light is above) and
 //! before the light. They are cut there.
@@ -21,6 +21,8 @@
 use fearless_simd::Simd;
 use glam::{Mat3, Vec2, Vec3};
 use gnomon_shadow_map::light_cone::LightCone;
+use gnomon_shadow_map::light_maps::Receiver;
+use scene_core::light::LightPoint;
 
 use crate::silhouettes::Edge;
 
@@ -128,6 +130,28 @@ impl Site {
         }
     }
 
+    /// Under a light without extent, which has no cone: b and a are two directions across the way to its centre, t is along
+    /// it.
+    pub fn without_cone(receiver: &Receiver, origin: Vec3, center: LightPoint) -> Self {
+        let (to_center, _) = center.ray_from(receiver.point);
+        let w = to_center.normalize_or(receiver.normal);
+        let (u, v) = w.any_orthonormal_pair();
+        Self {
+            point: receiver.point - origin,
+            normal: receiver.normal,
+            tolerance: receiver.tolerance,
+            light_from_receiver: Mat3::from_cols(u, v, w).transpose(),
+            orientation: -1.0,
+            is_parallel: true,
+        }
+    }
+
+    /// (a, b, t) of a point.
+    #[inline]
+    pub(crate) fn locate(&self, point: Vec3) -> Vec3 {
+        self.light_from_receiver * (point - self.point)
+    }
+
     /// The part of an edge, in (a, b, t), that lies above the receiver's plane, on the light's side of it and before the
     /// light.
     pub(crate) fn cut(&self, [a, b]: [Vec3; 2]) -> Option<[Vec3; 2]> {
@@ -152,6 +176,16 @@ impl Site {
         }
         Some(ends)
     }
+}
+
+/// Whether the light's centre lies left of the way from `a` to `b`, in (a, b, t).
+///
+/// Every face and every edge asks this of the same numbers, wherever it begins, so that all agree: the determinant is
+/// exactly the negative the other way round, and where it is 0 the centre is taken to be moved by (ε, ε²).
+#[inline]
+pub(crate) fn center_is_left(a: Vec3, b: Vec3) -> bool {
+    let line = a.cross(b);
+    line.z > 0.0 || (line.z == 0.0 && (line.x > 0.0 || (line.x == 0.0 && line.y > 0.0)))
 }
 
 /// Points of the light and what is counted at them; memory that is kept from receiver to receiver.
@@ -216,7 +250,8 @@ impl Counter {
             if let Some([a, b]) = site.cut(edges.ends(index)) {
                 self.counted += 1;
                 let line = a.cross(b);
-                let center_left = line.z > 0.0;
+                let [from, to] = edges.ends(index).map(|end| site.locate(end));
+                let center_left = center_is_left(from, to);
                 let step = mark * site.orientation * if center_left { -1.0 } else { 1.0 };
                 let taps = self.xs.chunks_exact(LANES).zip(self.ys.chunks_exact(LANES));
                 for ((xs, ys), counts) in taps.zip(self.counts.chunks_exact_mut(LANES)) {
@@ -268,7 +303,8 @@ impl Counter {
                 if edges.has_far {
                     let far = Vec3::new(fx[lane] - point.x, fy[lane] - point.y, fz[lane] - point.z);
                     // NaN does not rise.
-                    counts &= !(dot(normal, far) > tolerance);
+                    let rises = dot(normal, far) > tolerance;
+                    counts &= !rises;
                 }
                 *mark = if counts { multiplicity } else { 0.0 };
             }

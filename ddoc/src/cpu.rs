@@ -3,17 +3,16 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use fearless_simd::{Level, Simd, dispatch};
-use glam::Vec3;
 use gnomon_shadow_map::light_cone::LightCone;
 use gnomon_shadow_map::light_maps::Receiver;
 use rayon::prelude::*;
-use scene_core::light::LightPoint;
 use scene_core::raster::{DepthOptions, Fragments, RasterScratch, render_fragments};
 use scene_core::{Light, Report, Scene};
 
 use crate::coverage::{Counter, Site, TileEdges};
-use crate::distortion_map::{DistortionMap, Farthest};
-use crate::layers::{CenterEdge, Layers, Placed};
+use crate::distortion_map::{Farthest, distortion_map};
+use crate::grid::TileLists;
+use crate::layers::{Layers, Placed};
 use crate::light_image::LightImage;
 use crate::outer::{self, Kept};
 use crate::params::Variant;
@@ -21,7 +20,7 @@ use crate::silhouettes::Edge;
 use crate::tiles::{TileReceivers, Tiles};
 use crate::{PreparedDdoc, paper};
 
-/// `prepare.map`: every face over every texel, a view each.
+/// `prepare.map`: every face of `casters` over every texel's centre, a view each.
 pub fn draw_layers(
     scene: &Scene,
     casters: &[std::ops::Range<usize>],
@@ -32,33 +31,20 @@ pub fn draw_layers(
         (DepthOptions { triangles: Some(casters), ..Default::default() }, RasterScratch::new());
     let draw = |&image: &LightImage| {
         let matrix = image.view.projection_from_world;
-        let fragments: Fragments =
-            render_fragments(scene, matrix, image.size, image.size, &options, &mut scratch);
-        Layers { image, fragments, single }
+        let fragments: Fragments = if casters.is_empty() {
+            Fragments::default()
+        } else {
+            render_fragments(scene, matrix, image.size, image.size, &options, &mut scratch)
+        };
+        Layers::new(image, fragments, single)
     };
     images.iter().map(draw).collect()
-}
-
-/// `prepare.silhouettes`: the edges that the light's centre sees as silhouettes, in each view's image; one an edge, of
-/// multiplicity 0 for the others.
-pub fn center_edges(images: &[LightImage], edges: &[Edge], origin: Vec3) -> Vec<Vec<CenterEdge>> {
-    let in_image = |image: &LightImage| {
-        let place = |(index, edge): (usize, &Edge)| {
-            let ends =
-                (edge.from_center != 0).then(|| image.snapped([edge.a + origin, edge.b + origin])).flatten();
-            let multiplicity = if ends.is_some() { edge.from_center } else { 0 };
-            CenterEdge { ends: ends.unwrap_or_default(), multiplicity, edge: index as u32 }
-        };
-        edges.par_iter().enumerate().map(place).collect()
-    };
-    images.iter().map(in_image).collect()
 }
 
 /// What a thread keeps from tile to tile.
 #[derive(Default)]
 struct Thread {
     edges: TileEdges,
-    center: Vec<CenterEdge>,
     /// The same edges by index.
     indices: Vec<u32>,
     counter: Counter,
@@ -76,7 +62,7 @@ pub fn shade(
     let images: Vec<LightImage> = prepared.layers.iter().map(|layers| layers.image).collect();
     let lone = images.len() == 1;
     let tiles = report.time("shade.receivers", |_| Tiles::new(&images, lone, values, &site));
-    let maps: Vec<DistortionMap> = report.time("shade.splat", |_| {
+    let maps: Vec<TileLists> = report.time("shade.splat", |_| {
         let (edges, origin) = (&prepared.edges, prepared.origin);
         let ends = |edge: usize| [edges[edge].a + origin, edges[edge].b + origin];
         let splat = |(image, farthest): (&LightImage, &Farthest)| {
@@ -85,7 +71,7 @@ pub fn shade(
                 is_paper.then(|| image.along(edges[edge].far + origin))
             };
             let (hull, skip) = (prepared.hull.as_ref(), prepared.skip);
-            DistortionMap::new(image, &ends, &reach, edges.len(), hull, farthest, skip)
+            distortion_map(image, &ends, &reach, edges.len(), hull, farthest, skip)
         };
         images.iter().zip(&tiles.farthest).map(splat).collect()
     });
@@ -101,7 +87,7 @@ pub fn shade(
 fn hard(
     prepared: &PreparedDdoc<'_>,
     tiles: &Tiles,
-    maps: &[DistortionMap],
+    maps: &[TileLists],
     values: &mut [f32],
     report: &mut Report,
     site: &(impl Fn(usize) -> Result<Receiver, f32> + Sync),
@@ -118,11 +104,7 @@ fn hard(
                 last = (Some((view, tile)), maps[view].is_clear(tile));
             }
             if let (true, Ok(receiver)) = (last.1, site(index)) {
-                let layers = &prepared.layers[view];
-                let at_center = layers.image.place(receiver.point).map_or(0, |place| {
-                    let placed = Placed { receiver: &receiver, place };
-                    layers.at_texel(prepared.base.scene, &placed, prepared.base.light.center())
-                });
+                let at_center = before_center(prepared, view, &receiver, &site_of(prepared, &receiver).0);
                 *value = if at_center > 0 { 0.0 } else { 1.0 };
                 count += 1;
             }
@@ -138,7 +120,7 @@ fn hard(
 fn penumbra(
     prepared: &PreparedDdoc<'_>,
     tiles: &Tiles,
-    maps: &[DistortionMap],
+    maps: &[TileLists],
     values: &mut [f32],
     site: &(impl Fn(usize) -> Result<Receiver, f32> + Sync),
 ) {
@@ -160,25 +142,20 @@ fn penumbra(
 fn shade_tile<S: Simd>(
     simd: S,
     prepared: &PreparedDdoc<'_>,
-    map: &DistortionMap,
+    map: &TileLists,
     tile: &TileReceivers,
     receivers: &[u32],
     thread: &mut Thread,
     site: &(impl Fn(usize) -> Result<Receiver, f32> + Sync),
 ) -> Vec<f32> {
     thread.edges.clear();
-    thread.center.clear();
     thread.indices.clear();
     for edge in map.of(tile.tile) {
         thread.edges.push(&prepared.edges[edge as usize]);
         thread.indices.push(edge);
-        let center = prepared.center_edges[tile.view][edge as usize];
-        if center.multiplicity != 0 {
-            thread.center.push(center);
-        }
     }
     thread.edges.pad();
-    let splats = Tile { prepared, layers: &prepared.layers[tile.view] };
+    let splats = Tile { prepared, view: tile.view };
     receivers
         .iter()
         .map(|&index| match site(index as usize) {
@@ -191,7 +168,7 @@ fn shade_tile<S: Simd>(
 /// What a tile's receivers are answered from.
 struct Tile<'p, 'a> {
     prepared: &'p PreparedDdoc<'a>,
-    layers: &'p Layers,
+    view: usize,
 }
 
 impl Tile<'_, '_> {
@@ -199,12 +176,10 @@ impl Tile<'_, '_> {
     fn answer<S: Simd>(&self, simd: S, receiver: &Receiver, thread: &mut Thread) -> f32 {
         let prepared = self.prepared;
         let light = &prepared.base.light;
-        let at_center = self.at_center(receiver, &thread.center, light.center());
+        let (site, cone) = site_of(prepared, receiver);
+        let at_center = before_center(prepared, self.view, receiver, &site);
         let hard = if at_center > 0 { 0.0 } else { 1.0 };
-        let Some(cone) = LightCone::new(light, receiver.point) else { return hard };
-        let is_parallel = matches!(light, Light::Directional { .. });
-        let point = receiver.point - prepared.origin;
-        let site = Site::new(point, receiver.normal, receiver.tolerance, &cone, is_parallel);
+        let Some(cone) = cone else { return hard };
         // Only on a sphere do the points differ from receiver to receiver.
         if !thread.has_points || matches!(light, Light::Sphere { .. }) {
             thread.counter.set_points(prepared.points.iter().map(|&point| cone.share(point)));
@@ -219,25 +194,36 @@ impl Tile<'_, '_> {
             Variant::PenumbraMap => outer::visible(Kept::Darkest, &site, &thread.edges, hard),
             Variant::Paper => {
                 let edges = thread.indices.iter().map(|&edge| (edge, &prepared.edges[edge as usize]));
-                let (image, points) = (&self.layers.image, &prepared.points);
+                let (image, points) = (&prepared.layers[self.view].image, &prepared.points);
                 let light = (light, prepared.hull.as_ref());
-                paper::visible(light, image, receiver.point, prepared.origin, edges, points, hard)
+                paper::visible(light, image, receiver, prepared.origin, edges, points, hard)
             }
         }
     }
+}
 
-    fn at_center(&self, receiver: &Receiver, edges: &[CenterEdge], center: LightPoint) -> i32 {
-        let Some(place) = self.layers.image.place(receiver.point) else { return 0 };
-        let placed = Placed { receiver, place };
-        let ends = |edge: u32| {
-            let Edge { a, b, far, .. } = self.prepared.edges[edge as usize];
-            [a, b, far].map(|end| end + self.prepared.origin)
-        };
-        let at_texel = self.layers.at_texel(self.prepared.base.scene, &placed, center);
-        // A texel's splat is no edge between centres.
-        if self.prepared.variant == Variant::Paper {
-            return at_texel;
-        }
-        at_texel + self.layers.carried(&placed, center, edges, ends)
-    }
+/// A receiver as edges and faces see it, and its cone of lines to the light.
+fn site_of(prepared: &PreparedDdoc<'_>, receiver: &Receiver) -> (Site, Option<LightCone>) {
+    let (light, origin) = (&prepared.base.light, prepared.origin);
+    let Some(cone) = LightCone::new(light, receiver.point) else {
+        return (Site::without_cone(receiver, origin, light.center()), None);
+    };
+    let is_parallel = matches!(light, Light::Directional { .. });
+    let point = receiver.point - origin;
+    (Site::new(point, receiver.normal, receiver.tolerance, &cone, is_parallel), Some(cone))
+}
+
+/// How many faces lie between a receiver and the light's centre: the solid ones, those of masks, or what the map shows.
+fn before_center(prepared: &PreparedDdoc<'_>, view: usize, receiver: &Receiver, site: &Site) -> i32 {
+    let (layers, scene) = (&prepared.layers[view], prepared.base.scene);
+    let Some(place) = layers.image.place(receiver.point) else { return 0 };
+    let center = prepared.base.light.center();
+    let placed = Placed { receiver, place };
+    let ends = |edge: u32| {
+        let Edge { a, b, far, .. } = prepared.edges[edge as usize];
+        [a, b, far].map(|end| end + prepared.origin)
+    };
+    prepared.faces[view].before(scene, receiver, (site, prepared.origin), place, center)
+        + layers.at_texel(scene, &placed, center)
+        + layers.carried(&placed, center, ends)
 }

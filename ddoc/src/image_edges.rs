@@ -65,7 +65,7 @@ fn is_apart(map: &Discontinuities<'_>, corners: &[Option<Surface>; 4], inside: [
 /// An edge of no object: one layer on its left as the light sees it, on its right from below.
 pub(crate) fn outline([a, b]: [Vec3; 2]) -> Edge {
     let planes = [Vec4::new(0.0, 0.0, 0.0, 1.0), Vec4::ZERO];
-    // Beyond the edge every receiver is on the other side of it than the light: side_f is −1 where the light has +1.
+    // Beyond the edge every receiver is on the other side of it than the light: side(f) is −1 where the light has +1.
     Edge { a, b, planes, signs: [-1.0, 0.0], from_center: 1, far: Vec3::NAN }
 }
 

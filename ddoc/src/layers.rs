@@ -1,19 +1,20 @@
-//! Step 1, the map, with all its layers: how many faces lie between a receiver and the light's centre.
+//! Step 1 for what the map alone knows: how many layers lie between a receiver and the light's centre.
 //!
-//! A shadow map holds the nearest surface; the umbra under one caster then hides the penumbra of another. This map holds
-//! every face over every texel's centre. A receiver is not at a texel's centre, so the count found there is carried over
-//! to the receiver by the silhouettes between the two, exactly:
+//! A cut-out mask has no edges but those that are taken from the map ([`mask_edges`](crate::mask_edges)), and `image-edges`
+//! has none at all. Their layers are counted at a texel's centre. A receiver is not at a texel's centre, so the count found
+//! there is carried over to the receiver by the outlines between the two, exactly:
 //!
 //! > n(p) = n(t) + Σ m(e)·([p left of e] − [t left of e])
 //!
-//! over the edges e that the segment from the centre t to p crosses in the image, above the receiver's plane, with m(e)
+//! over the outlines e that the segment from the centre t to p crosses in the image, above the receiver's plane, with m(e)
 //! as the light's centre sees it (the derivation is that of [`silhouettes`](crate::silhouettes), with the centre in the
-//! receiver's place). Coverage of t was decided on snapped vertices, so the edges are snapped, too, and a centre on an
-//! edge belongs to the side that the top-left rule gives it to.
+//! receiver's place). Coverage of t was decided on snapped places, so outlines are snapped, too, and a centre on an
+//! outline belongs to the side that the top-left rule gives it to. An outline lies in one square of four centres, and so
+//! does the segment: each receiver asks those of one square.
 //!
 //! # Near the receiver
 //! Where a face lies as near to its receiver as its own surface may rise within a texel ([`is_near`]), the count at t says
-//! little about p. There the face is asked by the receiver's own ray, and edges as near are not counted: what is lost is
+//! little about p. There the face is asked by the receiver's own ray, and outlines as near are not counted: what is lost is
 //! what a hard map loses, a caster nearer to its receiver than that and not over the texel's centre.
 
 use glam::{Vec2, Vec3};
@@ -23,7 +24,9 @@ use scene_core::Scene;
 use scene_core::light::LightPoint;
 use scene_core::raster::{DEPTH_POSITION_ERROR, Fragments};
 
+use crate::grid::{Grid, TileLists};
 use crate::light_image::LightImage;
+use crate::silhouettes::Edge;
 
 /// A view's map.
 #[derive(Clone, Debug)]
@@ -34,9 +37,13 @@ pub struct Layers {
     pub fragments: Fragments,
     /// Whether the nearest alone counts, as in a plain shadow map.
     pub single: bool,
+    /// Outlines as the light's centre sees them.
+    outlines: Vec<CenterEdge>,
+    /// Which of them lie in each square of four centres.
+    squares: TileLists,
 }
 
-/// A silhouette as the light's centre sees it, in the image.
+/// An outline as the light's centre sees it, in the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CenterEdge {
     /// Its ends, snapped.
@@ -57,6 +64,47 @@ pub struct Placed<'r> {
 }
 
 impl Layers {
+    /// A map without outlines.
+    pub fn new(image: LightImage, fragments: Fragments, single: bool) -> Self {
+        let squares = TileLists::new(Grid::alone(1), 0, |_, _| {});
+        Self { image, fragments, single, outlines: Vec::new(), squares }
+    }
+
+    /// Takes over its outlines: those of `edges` that the light's centre sees, numbered from `first`, relative to `origin`.
+    pub fn set_outlines(&mut self, edges: &[Edge], first: u32, origin: Vec3) {
+        let seen = |(index, edge): (u32, &Edge)| {
+            let ends = self.image.snapped([edge.a + origin, edge.b + origin])?;
+            (edge.from_center != 0).then_some(CenterEdge {
+                ends,
+                multiplicity: edge.from_center,
+                edge: index,
+            })
+        };
+        self.outlines = (first..).zip(edges).filter_map(seen).collect();
+        let side = self.image.size + 1;
+        self.squares = TileLists::new(Grid::alone(side), self.outlines.len(), |index, enter| {
+            let [a, b] = self.outlines[index].ends;
+            // Its ends lie on two sides of one square, so that its middle is inside.
+            let square = [0, 1].map(|i| ((0.5 * (a[i] + b[i]) + 0.5).floor() as u32).min(side - 1));
+            enter(square[1] * side + square[0]);
+        });
+    }
+
+    /// Outlines as the light's centre sees them.
+    pub fn outlines(&self) -> &[CenterEdge] {
+        &self.outlines
+    }
+
+    /// Which of them lie in each square of four centres, from the one left of and above the first centre on.
+    pub fn squares(&self) -> &TileLists {
+        &self.squares
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.fragments.bytes() + size_of_val(&self.outlines[..]) + self.squares.bytes()
+    }
+
     /// The texel that holds a place: column and row; `None` beside the map, where there is no caster.
     #[inline]
     fn texel(&self, place: Vec2) -> Option<[u32; 2]> {
@@ -102,23 +150,16 @@ impl Layers {
 
     /// What the silhouettes between the texel's centre and the receiver add to [`at_texel`](Self::at_texel). `ends` are
     /// those of an edge and the point seen past it, in world space.
-    pub fn carried(
-        &self,
-        placed: &Placed<'_>,
-        center: LightPoint,
-        edges: &[CenterEdge],
-        ends: impl Fn(u32) -> [Vec3; 3],
-    ) -> i32 {
-        let Some(texel) = self.texel(placed.place) else { return 0 };
+    pub fn carried(&self, placed: &Placed<'_>, center: LightPoint, ends: impl Fn(u32) -> [Vec3; 3]) -> i32 {
+        let Some(texel) = self.texel(placed.place).filter(|_| !self.outlines.is_empty()) else { return 0 };
         let from = texel.map(|at| f64::from(at) + 0.5);
         let to = placed.place.to_array().map(f64::from);
-        let (low, high) = ([0, 1].map(|i| from[i].min(to[i])), [0, 1].map(|i| from[i].max(to[i])));
+        // The segment stays in one of the four squares around the centre.
+        let square = [0, 1].map(|i| texel[i] + u32::from(to[i] > from[i]));
         let mut sum = 0;
-        for edge in edges {
+        for index in self.squares.of(square[1] * (self.image.size + 1) + square[0]) {
+            let edge = &self.outlines[index as usize];
             let [a, b] = edge.ends;
-            if (0..2).any(|i| a[i].max(b[i]) < low[i] || a[i].min(b[i]) > high[i]) {
-                continue;
-            }
             let (a_side, b_side) = (cross(from, to, a), cross(from, to, b));
             if (a_side >= 0.0) == (b_side >= 0.0) {
                 continue;

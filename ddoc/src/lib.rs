@@ -5,6 +5,8 @@ pub mod coverage;
 pub mod cpu;
 pub mod discontinuity;
 pub mod distortion_map;
+pub mod faces;
+pub mod grid;
 pub mod image_edges;
 pub mod layers;
 pub mod light_image;
@@ -30,7 +32,8 @@ use scene_core::light::{LightHull, LightPoint};
 use scene_core::{GBuffer, Light, Report, Scene, VisibilityImage, relevance};
 
 use discontinuity::Discontinuities;
-use layers::{CenterEdge, Layers};
+use faces::Faces;
+use layers::Layers;
 use light_image::LightImage;
 pub use params::{DdocParams, Variant};
 use silhouettes::{Edge, silhouettes};
@@ -47,13 +50,12 @@ pub struct Ddoc {
 pub struct PreparedDdoc<'a> {
     /// The scene, the light and the tolerance; no maps.
     base: LightMaps<'a>,
-    /// The map, a view each.
+    /// The map, a view each: solid faces, and all that has its edges from the map.
+    faces: Vec<Faces>,
     layers: Vec<Layers>,
     /// Where edges are counted from.
     origin: Vec3,
     edges: Vec<Edge>,
-    /// The same as the light's centre sees them, a view each.
-    center_edges: Vec<Vec<CenterEdge>>,
     /// Bounds of the light; none of a sun that is too wide.
     hull: Option<LightHull>,
     /// Points of the light as shares of it.
@@ -89,61 +91,67 @@ impl Ddoc {
             (casters, images)
         });
         report.skip("casters", casters.backdrops.len() as u64);
-        let ranges: Vec<_> = casters.drawn.iter().map(|object| object.triangles.clone()).collect();
         // What one shadow map shows.
         let single = matches!(params.variant, Variant::ImageEdges | Variant::Paper);
-        let layers = report.time("prepare.map", |_| cpu::draw_layers(scene, &ranges, &images, single));
+        let of = |solid: bool| -> Vec<_> {
+            let is_solid = |object: &Object| !single && object.alpha.is_none();
+            let chosen = casters.drawn.iter().filter(|object| is_solid(object) == solid);
+            chosen.map(|object| object.triangles.clone()).filter(|range| !range.is_empty()).collect()
+        };
+        let (faces, mut layers) = report.time("prepare.map", |_| {
+            let solid = of(true);
+            let faces: Vec<_> = images.iter().map(|image| Faces::new(scene, &solid, image)).collect();
+            (faces, cpu::draw_layers(scene, &of(false), &images, single))
+        });
         let bounds = casters.drawn.iter().fold(Aabb::EMPTY, |all, object| all.union(object.bounds));
         let origin = if bounds.is_empty() { Vec3::ZERO } else { bounds.center() };
         let hull = LightHull::of(light);
-        let (edges, center_edges) = report.time("prepare.silhouettes", |report| {
-            let edges = match params.variant {
-                Variant::ImageEdges | Variant::Paper => {
-                    let in_map = |layers| {
-                        let map = Discontinuities::new(scene, layers, center, tolerance);
-                        match params.variant {
-                            Variant::Paper => paper::texel_splats(&map, origin, scene.bounds()),
-                            _ => image_edges::image_edges(&map, origin),
-                        }
-                    };
-                    layers.iter().flat_map(in_map).collect()
-                }
-                Variant::Ddoc => {
-                    object_edges(scene, &casters.drawn, origin, hull.as_ref(), center, &layers, report)?
-                }
+        let edges = report.time("prepare.silhouettes", |report| {
+            let mut edges = match params.variant {
+                Variant::ImageEdges | Variant::Paper => Vec::new(),
+                Variant::Ddoc => object_edges(scene, &casters.drawn, origin, hull.as_ref(), center, report)?,
                 Variant::Smoothies | Variant::PenumbraMap => {
                     let point = LightHull::of(&center.as_light());
-                    let drawn = &casters.drawn;
                     let mut edges =
-                        object_edges(scene, drawn, origin, point.as_ref(), center, &layers, report)?;
+                        object_edges(scene, &casters.drawn, origin, point.as_ref(), center, report)?;
                     edges.retain(|edge| edge.from_center != 0);
                     edges
                 }
             };
-            let center_edges = cpu::center_edges(&images, &edges, origin);
-            Ok::<_, TopologyError>((edges, center_edges))
+            for layers in &mut layers {
+                let in_map = || Discontinuities::new(scene, layers, center, tolerance);
+                let outlines = match params.variant {
+                    Variant::Paper => {
+                        edges.extend(paper::texel_splats(&in_map(), origin, scene.bounds()));
+                        continue;
+                    }
+                    Variant::ImageEdges => image_edges::image_edges(&in_map(), origin),
+                    _ => mask_edges::mask_edges(scene, origin, layers, center),
+                };
+                layers.set_outlines(&outlines, edges.len() as u32, origin);
+                edges.extend(outlines);
+            }
+            Ok::<_, TopologyError>(edges)
         })?;
-        report.bytes += layers.iter().map(|layers| layers.fragments.bytes() as u64).sum::<u64>()
-            + size_of_val(&edges[..]) as u64
-            + center_edges.iter().map(|edges| size_of_val(&edges[..]) as u64).sum::<u64>();
+        report.bytes += layers.iter().map(|layers| layers.bytes() as u64).sum::<u64>()
+            + faces.iter().map(|faces| faces.lists().bytes() as u64).sum::<u64>()
+            + size_of_val(&edges[..]) as u64;
         let backdrops = casters.backdrops;
         let base = LightMaps { scene, light: *light, maps: Vec::new(), backdrops, tolerance };
         let points = light_points::light_points(light, params.taps, params.seed);
         let DdocParams { variant, skip, .. } = *params;
-        let prepared =
-            PreparedDdoc { base, layers, origin, edges, center_edges, hull, points, variant, skip };
+        let prepared = PreparedDdoc { base, faces, layers, origin, edges, hull, points, variant, skip };
         Ok((prepared, report))
     }
 }
 
-/// The silhouettes of solid casters for any point of the light within `hull`, and the outlines of masks.
+/// The silhouettes of solid casters for any point of the light within `hull`.
 fn object_edges(
     scene: &Scene,
     casters: &[&Object],
     origin: Vec3,
     hull: Option<&LightHull>,
     center: LightPoint,
-    layers: &[Layers],
     report: &mut Report,
 ) -> Result<Vec<Edge>, TopologyError> {
     let drawn: HashSet<usize> = casters.iter().map(|object| object.triangles.start).collect();
@@ -151,15 +159,11 @@ fn object_edges(
         object.alpha.is_none() && !object.triangles.is_empty() && drawn.contains(&object.triangles.start)
     })?;
     report.skip("edges", found.left_out);
-    let mut edges = found.edges;
-    for layers in layers {
-        edges.extend(mask_edges::mask_edges(scene, origin, layers, center));
-    }
-    Ok(edges)
+    Ok(found.edges)
 }
 
 impl PreparedDdoc<'_> {
-    /// The map, a view each.
+    /// What has its edges from the map, a view each.
     pub fn layers(&self) -> &[Layers] {
         &self.layers
     }

@@ -44,6 +44,11 @@ impl Bounds {
         self.min.cmple(point).all() && point.cmple(self.max).all()
     }
 
+    /// Whether any of it lies in a square from 0 to `side`.
+    pub fn meets_square(&self, side: f32) -> bool {
+        self.min.max_element() <= side && self.max.min_element() >= 0.0
+    }
+
     /// Grows on all sides.
     #[must_use]
     pub fn grown(self, by: f32) -> Self {

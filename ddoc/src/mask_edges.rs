@@ -135,7 +135,7 @@ impl<'a> Face<'a> {
         Some(self.corners[0] * a + self.corners[1] * b + self.corners[2] * c)
     }
 
-    /// An outline's segment, solid on its left as the light's centre sees it: there sign(e, f)·side_f is +1.
+    /// An outline's segment, solid on its left as the light's centre sees it: there sign(e, f)·side(f) is +1.
     fn edge(&self, scene: &Scene, a: Vec3, b: Vec3, origin: Vec3, center: LightPoint) -> Edge {
         let corners = scene.corners(self.triangle);
         let facing = facing_of(corners, center);

@@ -12,6 +12,8 @@
 
 use glam::{Vec2, Vec3};
 use gnomon_shadow_map::light_cone::LightCone;
+use gnomon_shadow_map::light_maps::Receiver;
+use gnomon_shadow_map::receiver_plane::{is_near, rises_above};
 use rayon::prelude::*;
 use scene_core::Light;
 use scene_core::geometry::Aabb;
@@ -72,17 +74,18 @@ fn texel_splat(map: &Discontinuities<'_>, texel: [i32; 2], origin: Vec3, bottom:
     Some(Edge { far, ..outline(ends) })
 }
 
-/// V of a receiver at `point` under a light within its hull, whose centre sees it if `hard` is 1. `edges` are the splats that
+/// V of `receiver` under a light within its hull, whose centre sees it if `hard` is 1. `edges` are the splats that
 /// may reach it, in any order, with their numbers.
 pub fn visible<'e>(
     (light, hull): (&Light, Option<&LightHull>),
     image: &LightImage,
-    point: Vec3,
+    receiver: &Receiver,
     origin: Vec3,
     edges: impl Iterator<Item = (u32, &'e Edge)>,
     points: &[Vec2],
     hard: f32,
 ) -> f32 {
+    let Receiver { point, normal, tolerance, .. } = *receiver;
     let (Some(place), along) = (image.place(point), image.along(point)) else { return hard };
     let mut nearest: Option<(f32, u32, f32)> = None;
     for (number, edge) in edges {
@@ -93,6 +96,13 @@ pub fn visible<'e>(
         // Of equally near ones the first, whatever order they come in.
         let is_beaten = |&(least, first, _): &(f32, u32, f32)| (distance, number) >= (least, first);
         if image.along(middle) >= along || nearest.as_ref().is_some_and(is_beaten) {
+            continue;
+        }
+        // The splat's texel may show the receiver's own surface.
+        let diagonal = image.view.half_diagonal(image.view.depth_of(middle)) * (2.0 / image.size as f32);
+        let is_own = !rises_above(middle, point, normal, tolerance)
+            || is_near(middle, point, normal, light.center(), diagonal);
+        if is_own {
             continue;
         }
         // The receiver moved along its line to the light's centre, down to the far z.

@@ -4,9 +4,9 @@
 //! Let p be a receiver and s a point of the light. The depth complexity n(p, s) is the number of faces that the line
 //! from p to s meets. Turn every face f so that p sees it counter-clockwise; the boundary of all turned faces is the chain
 //!
-//! > Σ_e m(e)·e,  m(e) = Σ over faces f at e of sign(e, f)·side_f(p),
+//! > Σ_e m(e)·e,  m(e) = Σ over faces f at e of sign(e, f)·side(f, p),
 //!
-//! with side_f(p) = ±1 for the side of f's plane that p lies on ([`scene_core::geometry::EdgeTopology`] has sign(e, f)
+//! with side(f, p) = ±1 for the side of f's plane that p lies on ([`scene_core::geometry::EdgeTopology`] has sign(e, f)
 //! and shows why the chain is closed whatever the mesh). A turned face lies left of its boundary as p sees it; projected
 //! from p onto the light, crossing a directed edge from its right to its left therefore *enters* m(e) faces:
 //!

@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use gnomon_shadow_map::light_maps::Receiver;
 use rayon::prelude::*;
 
-use crate::distortion_map::{Farthest, Grid};
+use crate::distortion_map::Farthest;
+use crate::grid::Grid;
 use crate::light_image::LightImage;
 
 /// Of what needs no tile.

@@ -1,0 +1,273 @@
+//! Tiles of the light's image, and lists of what lies over each.
+//!
+//! What is sorted may be a texel wide or as wide as the image: a grid of tiles has coarser grids above it, four times as
+//! wide each, and everything goes to the finest one in which it covers few tiles. So memory is bounded by a number of
+//! entries a thing, whatever the light's size and the map's.
+
+use glam::Vec2;
+use rayon::prelude::*;
+
+use crate::light_image::Bounds;
+
+/// Things a task.
+const CHUNK: usize = 1024;
+
+/// Texels a side of a tile of the finest grid, at least; and tiles a side of the map, at most.
+const TILE: u32 = 8;
+const MOST_TILES: u32 = 128;
+
+/// Tiles a side that a splat may cover before it goes to the next grid; and a face.
+const MOST: u32 = 6;
+const MOST_FACE: u32 = 4;
+
+/// Grids at most: a map has at most 2¹⁴ texels a side.
+const MOST_LEVELS: usize = 8;
+
+/// Each grid's tiles are this many times as wide as those of the one below, as a power of two.
+pub(crate) const RATIO: u32 = 2;
+
+/// A range of tiles of one grid, inclusive.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Range {
+    pub(crate) level: u32,
+    pub(crate) first: [u32; 2],
+    pub(crate) last: [u32; 2],
+}
+
+/// The grids' geometry: receivers beside the map count, too, as far as its own width; those beyond go to the border tiles.
+#[derive(Clone, Copy, Debug)]
+pub struct Grid {
+    /// Texels of the map.
+    size: u32,
+    /// Texels beside the map on each side.
+    margin: u32,
+    /// Texels a side of a tile of the finest grid.
+    tile: u32,
+    /// Tiles a side of the finest grid.
+    tiles: u32,
+    /// Grids.
+    levels: u32,
+    /// Tiles a side that something may cover before it goes to the next grid.
+    most: u32,
+    /// Where the tiles of each grid begin among all grids' tiles, and where the last one's end.
+    starts: [u32; MOST_LEVELS + 1],
+}
+
+impl Grid {
+    /// Of splats in maps of `size` texels; `lone` if receivers beside it belong to it.
+    pub fn new(size: u32, lone: bool) -> Self {
+        let margin = if lone { size } else { 0 };
+        let tile = TILE.max(size.div_ceil(MOST_TILES));
+        let tiles = (size + 2 * margin).div_ceil(tile).max(1);
+        Self {
+            size,
+            margin,
+            tile,
+            tiles,
+            levels: levels(tiles, MOST),
+            most: MOST,
+            starts: [0; MOST_LEVELS + 1],
+        }
+        .started()
+    }
+
+    /// Of faces in maps of `size` texels: the finest tiles are texels.
+    pub fn of_texels(size: u32) -> Self {
+        let (levels, most) = (levels(size, MOST_FACE), MOST_FACE);
+        Self { size, margin: 0, tile: 1, tiles: size, levels, most, starts: [0; MOST_LEVELS + 1] }.started()
+    }
+
+    /// `side` tiles a side, and none above.
+    pub fn alone(side: u32) -> Self {
+        let most = side;
+        Self { size: side, margin: 0, tile: 1, tiles: side, levels: 1, most, starts: [0; MOST_LEVELS + 1] }
+            .started()
+    }
+
+    fn started(mut self) -> Self {
+        for level in 0..self.levels {
+            let tiles = self.tiles_at(level) * self.tiles_at(level);
+            self.starts[level as usize + 1] = self.starts[level as usize] + tiles;
+        }
+        self
+    }
+
+    /// Tiles of the finest grid.
+    pub fn count(&self) -> usize {
+        self.tiles as usize * self.tiles as usize
+    }
+
+    /// Tiles of all grids.
+    pub fn count_all(&self) -> usize {
+        self.first_of(self.levels)
+    }
+
+    /// Grids, each coarser than the one before.
+    pub fn levels(&self) -> u32 {
+        self.levels
+    }
+
+    pub(crate) fn tiles_at(&self, level: u32) -> u32 {
+        ((self.tiles - 1) >> (RATIO * level)) + 1
+    }
+
+    /// Where the tiles of a grid begin among all grids' tiles.
+    pub(crate) fn first_of(&self, level: u32) -> usize {
+        self.starts[level as usize] as usize
+    }
+
+    fn cell(&self, at: f32) -> u32 {
+        // NaN and what lies left of the grid saturate at 0.
+        (((at + self.margin as f32) / self.tile as f32) as u32).min(self.tiles - 1)
+    }
+
+    /// The tile that a place of the image falls into; the first for a place there is none of.
+    #[inline]
+    pub fn tile(&self, place: Option<Vec2>) -> u32 {
+        let place = place.unwrap_or(Vec2::NEG_INFINITY);
+        self.cell(place.y) * self.tiles + self.cell(place.x)
+    }
+
+    pub(crate) fn range(&self, bounds: Bounds) -> Range {
+        let (mut first, mut last) =
+            (bounds.min.to_array().map(|at| self.cell(at)), bounds.max.to_array().map(|at| self.cell(at)));
+        let mut level = 0;
+        while level + 1 < self.levels && (0..2).any(|axis| last[axis] - first[axis] >= self.most) {
+            level += 1;
+            (first, last) = (first.map(|at| at >> RATIO), last.map(|at| at >> RATIO));
+        }
+        Range { level, first, last }
+    }
+
+    /// Calls `enter` with every tile that bounds go to.
+    pub fn each_tile(&self, bounds: Bounds, enter: &mut dyn FnMut(u32)) {
+        let range = self.range(bounds);
+        let (first, side) = (self.first_of(range.level) as u32, self.tiles_at(range.level));
+        for row in range.first[1]..=range.last[1] {
+            for column in range.first[0]..=range.last[0] {
+                enter(first + row * side + column);
+            }
+        }
+    }
+
+    /// Texels of the map.
+    pub fn size(&self) -> u32 {
+        self.size
+    }
+}
+
+/// Grids enough for a coarsest one of `most` tiles a side.
+fn levels(tiles: u32, most: u32) -> u32 {
+    1 + (32 - (tiles / most).leading_zeros()).div_ceil(RATIO)
+}
+
+/// What lies over each tile of each grid.
+#[derive(Clone, Debug)]
+pub struct TileLists {
+    grid: Grid,
+    /// What lies over tile i, over all grids, is `all[first[i]..first[i + 1]]`.
+    first: Vec<u32>,
+    all: Vec<u32>,
+    /// Of what was to be sorted in, how much lies over no tile.
+    pub left_out: u64,
+}
+
+impl TileLists {
+    /// Sorts `count` things: `enter` calls its second argument with every tile that one of them lies over.
+    pub fn new(grid: Grid, count: usize, enter: impl Fn(usize, &mut dyn FnMut(u32)) + Sync) -> Self {
+        let parts: Vec<(Vec<[u32; 2]>, u64)> = (0..count.div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|part| {
+                let (mut entries, mut left_out) = (Vec::new(), 0);
+                for thing in part * CHUNK..count.min((part + 1) * CHUNK) {
+                    let before = entries.len();
+                    enter(thing, &mut |tile| entries.push([tile, thing as u32]));
+                    left_out += u64::from(entries.len() == before);
+                }
+                (entries, left_out)
+            })
+            .collect();
+        // In order of the things within each tile, whatever the number of threads.
+        let mut first = vec![0u32; grid.count_all() + 1];
+        for [tile, _] in parts.iter().flat_map(|part| &part.0) {
+            first[*tile as usize + 1] += 1;
+        }
+        let mut sum = 0;
+        for count in &mut first {
+            sum += *count;
+            *count = sum;
+        }
+        let mut all = vec![0; sum as usize];
+        let mut cursor = first.clone();
+        for [tile, thing] in parts.iter().flat_map(|part| &part.0) {
+            let at = &mut cursor[*tile as usize];
+            all[*at as usize] = *thing;
+            *at += 1;
+        }
+        Self { grid, first, all, left_out: parts.iter().map(|part| part.1).sum() }
+    }
+
+    /// What lies over a tile of the finest grid: what its own list holds and those of the tiles above it.
+    #[inline]
+    pub fn of(&self, tile: u32) -> impl Iterator<Item = u32> + '_ {
+        let (column, row) = (tile % self.grid.tiles, tile / self.grid.tiles);
+        (0..self.grid.levels).flat_map(move |level| {
+            let side = self.grid.tiles_at(level);
+            let shift = RATIO * level;
+            let at = self.grid.first_of(level) + ((row >> shift) * side + (column >> shift)) as usize;
+            self.all[self.first[at] as usize..self.first[at + 1] as usize].iter().copied()
+        })
+    }
+
+    /// Whether nothing lies over a tile.
+    pub fn is_clear(&self, tile: u32) -> bool {
+        self.of(tile).next().is_none()
+    }
+
+    /// Each entry replaced.
+    #[must_use]
+    pub fn map(mut self, by: impl Fn(u32) -> u32) -> Self {
+        self.all.iter_mut().for_each(|entry| *entry = by(*entry));
+        self
+    }
+
+    /// The grids.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Where each tile's list begins in [`all`](Self::all), the finest grid's tiles first, and where the last one ends.
+    pub fn first(&self) -> &[u32] {
+        &self.first
+    }
+
+    /// Entries of all tiles.
+    pub fn all(&self) -> &[u32] {
+        &self.all
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.first[..]) + size_of_val(&self.all[..])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_range_holds_its_bounds_at_every_level() {
+        let grid = Grid::new(1024, true);
+        for (min, max) in [(0.0, 3.0), (-2000.0, 5000.0), (100.0, 180.0), (700.5, 1500.0)] {
+            let bounds = Bounds { min: Vec2::splat(min), max: Vec2::splat(max) };
+            let range = grid.range(bounds);
+            assert!(range.last[0] - range.first[0] < MOST || range.level + 1 == grid.levels);
+            for at in [min, (min + max) * 0.5, max] {
+                let cell = grid.cell(at) >> (RATIO * range.level);
+                assert!((range.first[0]..=range.last[0]).contains(&cell), "{at} in {range:?}");
+            }
+        }
+        assert_eq!(grid.tile(None), 0);
+    }
+}
