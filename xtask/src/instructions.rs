@@ -2,9 +2,10 @@
 //!
 //! Milliseconds of a shared machine guard nothing; instructions of one thread do. `valgrind --tool=callgrind` counts those between the
 //! ends of one run, prepare and shade, of each technique's default on a small picture; `xtask/instructions.json` keeps them. More than
-//! [`GROWTH`] of them is a failure, and so are much fewer, until they are accepted: a gain is guarded, too.
+//! [`GROWTH`] of them is a failure, and so are much fewer, until they are accepted: a gain is guarded, too. So is vector code that the
+//! compiler has not inlined: it then calls a function for each operation, and is several times as slow, whatever it was before.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
@@ -17,6 +18,12 @@ const GROWTH: f64 = 1.05;
 
 /// The function whose instructions count, with all that it calls.
 const COUNTED: &str = "*Stand*on_cpu*";
+
+/// In the names of the vector library's functions of one operation each.
+const OPERATION: &str = "fearless_simd_kernel";
+
+/// The part of all instructions that such functions may take where they stand apart: what is seldom run may call them.
+const APART: f64 = 0.01;
 
 /// Scenes that are counted on. One is enough to tell a slip, and takes under a minute in all.
 const SCENES: [&str; 1] = ["ball"];
@@ -113,9 +120,47 @@ fn count(program: &str, technique: &str, scene: &str) -> Result<u64, CheckError>
     output_of("valgrind", &[&valgrind[..], &render[..], &one[..]].concat())?;
     let profile =
         fs::read_to_string(&file).map_err(|source| CheckError::Read { path: file.clone(), source })?;
-    total(&profile)
+    let total = total(&profile)
         .filter(|&total| total > 0)
-        .ok_or_else(|| CheckError::Failed(format!("{} counts nothing in {COUNTED}", file.display())))
+        .ok_or_else(|| CheckError::Failed(format!("{} counts nothing in {COUNTED}", file.display())))?;
+    let apart = apart(&profile);
+    if apart as f64 > APART * total as f64 {
+        return Err(CheckError::Failed(format!(
+            "{technique} on {scene}: {apart} of {total} instructions are vector operations that are not inlined: mark what \
+             lies between `dispatch!` and them #[inline(always)], closures too"
+        )));
+    }
+    Ok(total)
+}
+
+/// Instructions of vector operations that are functions of their own.
+fn apart(profile: &str) -> u64 {
+    let mut operations = HashSet::new();
+    let (mut is_inside, mut is_of_call, mut sum) = (false, false, 0);
+    for line in profile.lines() {
+        // A name is written out where it comes first, and is a number from then on.
+        let mut is_operation = |name: &str| {
+            let (number, name) = name.split_once(' ').map_or((name, ""), |(number, name)| (number, name));
+            if name.contains(OPERATION) {
+                operations.insert(number.to_owned());
+            }
+            operations.contains(number)
+        };
+        if let Some(name) = line.strip_prefix("fn=") {
+            is_inside = is_operation(name);
+        } else if let Some(name) = line.strip_prefix("cfn=") {
+            is_operation(name);
+        } else if line.starts_with("calls=") {
+            is_of_call = true;
+        } else if line.starts_with(|c: char| c.is_ascii_digit() || "+-*".contains(c)) {
+            if is_inside && !is_of_call {
+                sum +=
+                    line.split_whitespace().nth(1).and_then(|count| count.parse::<u64>().ok()).unwrap_or(0);
+            }
+            is_of_call = false;
+        }
+    }
+    sum
 }
 
 /// The total of a profile.
@@ -145,6 +190,14 @@ mod tests {
         }
         assert_eq!(faults(&BTreeMap::new(), &map(1)).len(), 2);
         assert_eq!(faults(&map(1), &BTreeMap::new()).len(), 2);
+    }
+
+    #[test]
+    fn operations_apart_are_told_by_their_names() {
+        let profile = "fn=(1) shade\n1 20\ncfn=(2) Avx2::add_f32x8::kernel::__fearless_simd_kernel\ncalls=1 3\n1 300\n\
+                       fn=(2)\n+2 7\ncfn=(1)\ncalls=2 3\n* 40\n-1 2\nfn=(1)\n1 5\ntotals: 34\n";
+        assert_eq!(apart(profile), 9);
+        assert_eq!(apart("fn=(1) shade\n1 20\n"), 0);
     }
 
     #[test]
