@@ -25,7 +25,7 @@ pub struct Casters<'a> {
 }
 
 /// Whether an object's outline is that of its triangles.
-fn has_edges(object: &Object) -> bool {
+pub(crate) fn has_edges(object: &Object) -> bool {
     object.flags.casts && object.alpha.is_none()
 }
 

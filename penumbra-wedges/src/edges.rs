@@ -174,7 +174,13 @@ impl Edges {
 }
 
 /// Whether two faces lie in one plane on both sides of their edge, exactly: then they add up to 0 from everywhere.
-fn is_flat(scene: &Scene, topology: &EdgeTopology, edge: usize, a: Incidence, b: Incidence) -> bool {
+pub(crate) fn is_flat(
+    scene: &Scene,
+    topology: &EdgeTopology,
+    edge: usize,
+    a: Incidence,
+    b: Incidence,
+) -> bool {
     let corners = [a, b].map(|face| scene.corners(face.face() as usize));
     let ends = topology.vertices()[edge].map(|vertex| scene.positions()[vertex as usize]);
     let Some(apex) = corners[1].into_iter().find(|corner| !ends.contains(corner)) else { return false };

@@ -1,7 +1,10 @@
 //! Why no wedges were made.
 
 use scene_core::geometry::TopologyError;
+use scene_core::technique::{Params as _, TechniqueError};
 use thiserror::Error;
+
+use crate::WedgeParams;
 
 /// Why no wedges were made.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -17,4 +20,17 @@ pub enum WedgeError {
         /// The object's name.
         object: String,
     },
+}
+
+impl From<WedgeError> for TechniqueError {
+    fn from(error: WedgeError) -> Self {
+        match error {
+            WedgeError::Masked { .. } => Self::Unsupported {
+                technique: WedgeParams::TECHNIQUE,
+                input: "casters with cut-out masks".to_owned(),
+                why: error.to_string(),
+            },
+            WedgeError::Topology(_) => Self::Other(Box::new(error)),
+        }
+    }
 }

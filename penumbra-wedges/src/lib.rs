@@ -9,6 +9,8 @@ pub mod depth_complexity;
 pub mod edges;
 mod error;
 pub mod exact;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod interpolated;
 pub mod layers;
 mod params;
@@ -29,6 +31,8 @@ pub use casters::Casters;
 use cpu::Answer;
 pub use error::WedgeError;
 use exact::{Scratch, Work};
+#[cfg(feature = "gpu")]
+pub use gpu::PenumbraWedgesOnGpu;
 pub use params::{Variant, WedgeParams};
 use receiver::Receiver;
 pub use technique::Factory;

@@ -1,13 +1,19 @@
 //! The trait's implementation, nothing else.
 
 use glam::Vec3;
+#[cfg(feature = "gpu")]
+use scene_core::Camera;
+#[cfg(feature = "gpu")]
+use scene_core::gpu::{GpuGBuffer, GpuShadowQuery, GpuShadowTechnique, Recorder};
 use scene_core::technique::{
     Capability, Description, Params, PreparedShadow, ShadowQuery, ShadowTechnique, Support, TechniqueError,
     TechniqueFromParams,
 };
 use scene_core::{GBuffer, Report, VisibilityImage};
 
-use crate::{Casters, PenumbraWedges, PreparedWedges, Variant, WedgeError, WedgeParams};
+#[cfg(feature = "gpu")]
+use crate::PenumbraWedgesOnGpu;
+use crate::{Casters, PenumbraWedges, PreparedWedges, Variant, WedgeParams};
 
 impl ShadowTechnique for PenumbraWedges {
     fn name(&self) -> &'static str {
@@ -30,7 +36,13 @@ impl ShadowTechnique for PenumbraWedges {
                 Support::Unsupported("the outline of a mask's holes has no edges: only `exact` traces them")
             }
             Capability::TriangleSoup | Capability::FreePoints => soft,
-            Capability::Gpu => Support::Unsupported("the CPU path is the only one so far"),
+            Capability::Gpu if !cfg!(feature = "gpu") => {
+                Support::Unsupported("built without the feature 'gpu'")
+            }
+            Capability::Gpu if self.params.variant == Variant::Interpolated => {
+                Support::Unsupported(ON_CPU_ALONE)
+            }
+            Capability::Gpu => Support::Exact,
         };
         Description::new(SUMMARY, support)
     }
@@ -43,20 +55,52 @@ impl ShadowTechnique for PenumbraWedges {
         &self,
         query: &ShadowQuery<'a>,
     ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError> {
-        let refused = |error: WedgeError| match error {
-            WedgeError::Masked { .. } => TechniqueError::Unsupported {
-                technique: WedgeParams::TECHNIQUE,
-                input: "casters with cut-out masks".to_owned(),
-                why: error.to_string(),
-            },
-            WedgeError::Topology(_) => TechniqueError::Other(Box::new(error)),
-        };
         let mut report = Report::default();
-        let casters = report.time("prepare.edges", |_| Casters::new(query.scene)).map_err(refused)?;
-        let (prepared, rest) =
-            PenumbraWedges::prepare(self, &casters, query.light, query.camera).map_err(refused)?;
+        let casters = report.time("prepare.edges", |_| Casters::new(query.scene))?;
+        let (prepared, rest) = PenumbraWedges::prepare(self, &casters, query.light, query.camera)?;
         report.merge(&rest);
         Ok((Box::new(prepared), report))
+    }
+
+    #[cfg(feature = "gpu")]
+    fn gpu(
+        &self,
+        device: &wgpu::Device,
+        visibility: wgpu::TextureFormat,
+    ) -> Result<Box<dyn GpuShadowTechnique>, TechniqueError> {
+        if self.params.variant == Variant::Interpolated {
+            return Err(TechniqueError::Unsupported {
+                technique: WedgeParams::TECHNIQUE,
+                input: "variant interpolated on the GPU".to_owned(),
+                why: ON_CPU_ALONE.to_owned(),
+            });
+        }
+        Ok(Box::new(PenumbraWedgesOnGpu::new(device, self.params, visibility)))
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl GpuShadowTechnique for PenumbraWedgesOnGpu {
+    fn prepare(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        query: &GpuShadowQuery<'_>,
+    ) -> Result<Report, TechniqueError> {
+        PenumbraWedgesOnGpu::prepare(self, recorder, query)
+    }
+
+    fn shade(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        camera: &Camera,
+        gbuffer: &GpuGBuffer<'_>,
+        visibility: &wgpu::TextureView,
+    ) -> Result<Report, TechniqueError> {
+        PenumbraWedgesOnGpu::shade(self, recorder, camera, gbuffer, visibility)
+    }
+
+    fn survives_camera(&self) -> bool {
+        false
     }
 }
 
@@ -75,6 +119,8 @@ impl PreparedShadow for PreparedWedges<'_> {
         false
     }
 }
+
+const ON_CPU_ALONE: &str = "`interpolated` has a CPU path alone";
 
 const SUMMARY: &str = "soft shadow volumes: penumbra wedges around edges, up to exact";
 

@@ -62,62 +62,102 @@ fn check(scene: &Scene, light: &Light, camera: &Camera, what: &str) {
     }
 }
 
+fn scenes_without_area() -> [Scene; 6] {
+    let x = Vec3::X;
+    [
+        Scene::new(),
+        triangle([Vec3::ZERO, x, Vec3::Z]),
+        triangle([Vec3::ZERO; 3]),
+        triangle([Vec3::ZERO, x, x * 2.0]),
+        triangle([x * 1e30, Vec3::Z * 1e30, -x * 1e30]),
+        triangle([x * 1e-30, Vec3::Z * 1e-30, -x * 1e-30]),
+    ]
+}
+
 #[test]
 fn scenes_without_area_are_answered() {
-    let x = Vec3::X;
     for light in &LIGHTS {
-        for scene in [
-            Scene::new(),
-            triangle([Vec3::ZERO, x, Vec3::Z]),
-            triangle([Vec3::ZERO; 3]),
-            triangle([Vec3::ZERO, x, x * 2.0]),
-            triangle([x * 1e30, Vec3::Z * 1e30, -x * 1e30]),
-            triangle([x * 1e-30, Vec3::Z * 1e-30, -x * 1e-30]),
-        ] {
+        for scene in scenes_without_area() {
             check(&scene, light, &CAMERA, "one triangle");
         }
     }
 }
 
-/// Lights that touch or hold geometry, edges through them and that point at them, needles, at scales from 10⁻³ to 10⁶.
-#[test]
-fn stress_list() {
+/// Lights that touch or hold geometry, edges through them and that point at them, needles; all at a scale.
+fn stress_list(scale: f32) -> (Scene, Camera, [Light; 9]) {
     let needle =
         |a: Vec3, b: Vec3| TriangleMesh::new("needle", vec![a, b, b + Vec3::X * 1e-5], vec![[0, 1, 2]]);
-    let meshes = [
+    let mut scene = Scene::new();
+    for mesh in [
         sheet(0.0, [-3.0, -3.0], [3.0, 3.0]),
         cube(Vec3::new(0.0, 0.5, 0.0), 0.5),
         needle(Vec3::new(0.0, 3.0, 0.0), Vec3::new(0.0, 0.2, 1.0)),
         needle(Vec3::new(-3.0, 0.5, -3.0), Vec3::new(3.0, 0.5, 3.0)),
         // An edge along the line through the lights' middles.
         needle(Vec3::new(0.0, 1.5, 0.0), Vec3::new(0.0, 2.0, 0.0)),
-    ];
-    for scale in [1e-3_f32, 1.0, 1e3, 1e6] {
-        let mut scene = Scene::new();
-        for mesh in &meshes {
-            scene
-                .add(mesh, Affine3A::from_scale(Vec3::splat(scale)), ObjectFlags::default())
-                .expect("finite");
+    ] {
+        scene.add(&mesh, Affine3A::from_scale(Vec3::splat(scale)), ObjectFlags::default()).expect("finite");
+    }
+    let camera = Camera { eye: CAMERA.eye * scale, near: 0.01 * scale, far: 100.0 * scale, ..CAMERA };
+    let lights = LIGHTS.map(|light| match light {
+        Light::Sphere { center, radius } => Light::Sphere { center: center * scale, radius: radius * scale },
+        Light::Rect { center, half_u, half_v } => {
+            Light::Rect { center: center * scale, half_u: half_u * scale, half_v: half_v * scale }
         }
-        let camera = Camera { eye: CAMERA.eye * scale, near: 0.01 * scale, far: 100.0 * scale, ..CAMERA };
-        for light in LIGHTS {
-            let light = match light {
-                Light::Sphere { center, radius } => {
-                    Light::Sphere { center: center * scale, radius: radius * scale }
-                }
-                Light::Rect { center, half_u, half_v } => {
-                    Light::Rect { center: center * scale, half_u: half_u * scale, half_v: half_v * scale }
-                }
-                Light::Disk { center, normal, radius } => {
-                    Light::Disk { center: center * scale, normal, radius: radius * scale }
-                }
-                Light::Point { position } => Light::Point { position: position * scale },
-                Light::Spot { position, direction, outer, inner } => {
-                    Light::Spot { position: position * scale, direction, outer, inner }
-                }
-                Light::Directional { .. } => light,
-            };
+        Light::Disk { center, normal, radius } => {
+            Light::Disk { center: center * scale, normal, radius: radius * scale }
+        }
+        Light::Point { position } => Light::Point { position: position * scale },
+        Light::Spot { position, direction, outer, inner } => {
+            Light::Spot { position: position * scale, direction, outer, inner }
+        }
+        Light::Directional { .. } => light,
+    });
+    (scene, camera, lights)
+}
+
+const SCALES: [f32; 4] = [1e-3, 1.0, 1e3, 1e6];
+
+#[test]
+fn hard_geometry_is_answered_at_all_scales() {
+    for scale in SCALES {
+        let (scene, camera, lights) = stress_list(scale);
+        for light in lights {
             check(&scene, &light, &camera, &format!("scale {scale}"));
+        }
+    }
+}
+
+/// The same on the GPU, one value a variant for all of them.
+#[cfg(feature = "gpu")]
+#[test]
+fn the_gpu_answers_as_well() {
+    use gnomon_penumbra_wedges::PenumbraWedgesOnGpu;
+    use scene_core::gpu::headless::VISIBILITY_FORMAT;
+    use scene_core::gpu::testing;
+
+    let Some(gpu) = testing::gpu() else { return };
+    let cases =
+        scenes_without_area().into_iter().map(|scene| (scene, CAMERA, LIGHTS)).chain(SCALES.map(stress_list));
+    let mut on_gpu = [Variant::Coverage, Variant::Exact].map(|variant| {
+        let params = WedgeParams { variant, views: 32, rays: false, ..Default::default() };
+        PenumbraWedgesOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT)
+    });
+    for (scene, camera, lights) in cases {
+        let gbuffer = raster::render_gbuffer(&scene, &camera);
+        let mut view = gpu.view(&scene, &camera).expect("small");
+        view.upload_gbuffer(&gbuffer).expect("of its size");
+        for light in &lights {
+            for technique in &mut on_gpu {
+                let image = view.run(technique, light, &gbuffer).expect("supported").visibility;
+                for (pixel, &v) in image.values.iter().enumerate() {
+                    assert_eq!(
+                        gbuffer.is_seen(pixel),
+                        (0.0..=1.0).contains(&v),
+                        "{light:?}: pixel {pixel} is {v}"
+                    );
+                }
+            }
         }
     }
 }

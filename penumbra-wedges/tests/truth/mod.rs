@@ -46,12 +46,24 @@ pub(crate) fn shade(
     params: WedgeParams,
 ) -> (GBuffer, VisibilityImage, Report) {
     let gbuffer = raster::render_gbuffer(scene, camera);
+    let (visibility, report) = shade_gbuffer(scene, light, camera, &gbuffer, params);
+    (gbuffer, visibility, report)
+}
+
+/// V of every pixel of a G-buffer, and what it took.
+pub(crate) fn shade_gbuffer(
+    scene: &Scene,
+    light: &Light,
+    camera: &Camera,
+    gbuffer: &GBuffer,
+    params: WedgeParams,
+) -> (VisibilityImage, Report) {
     let casters = Casters::new(scene).expect("edges");
     let (prepared, mut report) =
         PenumbraWedges::new(params).prepare(&casters, light, camera).expect("no masks");
     let mut visibility = VisibilityImage::new(camera.width, camera.height);
-    report.merge(&prepared.shade(&gbuffer, &mut visibility));
-    (gbuffer, visibility, report)
+    report.merge(&prepared.shade(gbuffer, &mut visibility));
+    (visibility, report)
 }
 
 /// The root of the mean squared error against ground truth of `samples` rays, over valid pixels.

@@ -144,7 +144,7 @@ impl DepthUniform {
 mod tests {
     use super::*;
     use crate::assert_layout;
-    use crate::gpu::shaders;
+    use crate::gpu::{CasterNode, shaders};
 
     fn shader(name: &str) -> &'static str {
         shaders::ALL.iter().find(|(module, _)| *module == name).unwrap().1
@@ -159,6 +159,7 @@ mod tests {
             [clip_from_relative, right, tan_x, up, tan_y, forward, near, eye, far, size, depth_scale]
         );
         assert_layout!(LightUniform, shader("light"), "Light", [center, kind, axis, extent, u, sine, v]);
+        assert_layout!(CasterNode, shader("caster_tree"), "Node", [low, skip, high, first, count]);
         assert_layout!(DepthUniform, shader("depth_pass"), "DepthView", [clip_from_relative, origin]);
     }
 

@@ -7,6 +7,7 @@
 //! | [`gbuffer`] | the G-buffer pass |
 //! | [`depth`] | the shadow-depth pass |
 //! | [`layers`] | depth maps as layers of one texture |
+//! | [`caster_tree`] | the casters' tree, as shaders walk it |
 //! | [`receivers`] | camera, light and G-buffer, as shaders read them |
 //! | [`visibility`] | the full-screen pass that writes V |
 //! | [`compute`] | compute passes and the buffers they write |
@@ -27,10 +28,12 @@
 //! `shaders/*.wesl` of this crate are WESL modules: `scene_core::camera`, `light`, `sampling`, `gbuffer`, `scene`,
 //! `cutout`, `receivers`, `receiver_plane` and `full_screen` are imported by technique crates at build time (crate
 //! `gnomon-shader-build` says how and why); so are `light_views`, `depths`, `texel_plane`, `light_cone` and `pixel_hash`,
-//! what lookups in the maps of `gnomon-shadow-map` consist of: their Rust twins lie in that crate. Bind groups have fixed places: 0 is the pass's own, 1 the scene's triangles,
+//! what lookups in the maps of `gnomon-shadow-map` consist of: their Rust twins lie in that crate. `shadow_rays` traces,
+//! with `caster_tree`, `shadow_origin` and the `predicates` that decide where f32 cannot. Bind groups have fixed places: 0 is the pass's own, 1 the scene's triangles,
 //! 2 its cut-outs, 3 the receivers and the light.
 
 pub mod adapter;
+pub mod caster_tree;
 pub mod compute;
 pub mod depth;
 mod error;
@@ -50,6 +53,7 @@ pub mod timing;
 pub mod visibility;
 
 pub use adapter::Gpu;
+pub use caster_tree::{CasterNode, CasterTrees};
 pub use compute::{ComputePass, WorkBuffer};
 pub use depth::{DepthIds, DepthPass, DepthTarget, WrittenProjection};
 pub use error::GpuError;

@@ -27,13 +27,12 @@
 //!
 //! # Exactness
 //! V differs from one exact shadow ray a pixel only where the position, kept as a distance in f32, is rounded to the other
-//! side of an outline. Facing and the eye's side of each edge are decided to 41 bits (`predicates.wesl`).
+//! side of an outline. Facing and the eye's side of each edge are decided to 41 bits (`scene_core::predicates`).
 
 pub mod layout;
 pub mod planar;
 pub mod shaders;
 pub mod tables;
-pub mod tree;
 pub mod volumes;
 
 use scene_core::gpu::{GpuGBuffer, GpuShadowQuery, Recorder};

@@ -3,10 +3,9 @@
 use scene_core::Scene;
 use scene_core::bvh::Bvh;
 use scene_core::geometry::EdgeTopology;
-use scene_core::gpu::{GpuError, GpuScene};
+use scene_core::gpu::{CasterTrees, GpuError, GpuScene};
 use wgpu::util::DeviceExt as _;
 
-use super::tree::Trees;
 use crate::error::VolumeError;
 
 /// Why the tables of a scene were not made.
@@ -56,7 +55,7 @@ impl Tables {
         let is_solid = |o: &scene_core::geometry::Object| o.flags.casts && o.alpha.is_none();
         let (topology, trees) = rayon::join(
             || EdgeTopology::of_scene(geometry, is_solid),
-            || Trees::new(geometry, &Bvh::casters(geometry)),
+            || CasterTrees::new(geometry, &Bvh::casters(geometry)),
         );
         let topology = topology.map_err(VolumeError::from)?;
         let (mut first, mut incident) = (vec![0_u32], Vec::new());

@@ -1,19 +1,20 @@
 //! The casters' tree as shaders walk it: nodes in order of depth, each with where its subtree ends, so that a walk needs
-//! no stack. Twin of `tree.wesl`.
+//! no stack. Twin of `caster_tree.wesl`.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-use scene_core::Scene;
-use scene_core::bvh::Bvh;
-use scene_core::geometry::Aabb;
+
+use crate::Scene;
+use crate::bvh::Bvh;
+use crate::geometry::Aabb;
 
 /// Triangles a leaf.
 const LEAF: usize = 4;
 
-/// `Node` of `tree.wesl`.
+/// `Node` of `caster_tree.wesl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct Node {
+pub struct CasterNode {
     /// Lower corner of its box.
     pub low: Vec3,
     /// The node after its subtree.
@@ -30,16 +31,16 @@ pub struct Node {
 
 /// A tree of the solid casters and, after it, one of those with masks.
 #[derive(Clone, Debug, Default)]
-pub struct Trees {
+pub struct CasterTrees {
     /// Nodes of both.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<CasterNode>,
     /// How many are of the solid ones.
     pub solid: u32,
     /// Triangles and their objects.
     pub leaves: Vec<[u32; 2]>,
 }
 
-impl Trees {
+impl CasterTrees {
     /// The casters of `scene`, in the order of its CPU tree, which keeps close what is close, and halved again and again.
     pub fn new(scene: &Scene, tree: &Bvh) -> Self {
         let (mut solid, mut masked) = (Vec::new(), Vec::new());
@@ -65,7 +66,7 @@ impl Trees {
             return Aabb::EMPTY;
         }
         let own = self.nodes.len();
-        self.nodes.push(Node::zeroed());
+        self.nodes.push(CasterNode::zeroed());
         let bounds = if triangles.len() <= LEAF {
             self.nodes[own].first = self.leaves.len() as u32;
             self.nodes[own].count = triangles.len() as u32;
@@ -85,15 +86,14 @@ impl Trees {
 
 #[cfg(test)]
 mod tests {
-    use scene_core::scenes;
-
     use super::*;
+    use crate::scenes;
 
     #[test]
     fn every_caster_lies_in_one_leaf_and_in_all_boxes_above() {
         let scene = scenes::build("fence", 0.0).unwrap().scene;
         let tree = Bvh::casters(&scene);
-        let trees = Trees::new(&scene, &tree);
+        let trees = CasterTrees::new(&scene, &tree);
         assert_eq!(trees.leaves.len(), tree.triangle_count());
         let mut found: Vec<u32> = trees.leaves.iter().map(|[triangle, _]| *triangle).collect();
         found.sort_unstable();

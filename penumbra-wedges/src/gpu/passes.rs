@@ -1,0 +1,118 @@
+//! The pipelines.
+
+use scene_core::gpu::{
+    ComputePass, HeldGroup, Receivers, SceneBindings, VisibilityPass, VisibilityPassParts, binding,
+};
+
+use super::shaders;
+use crate::params::Variant;
+
+/// A compute pass with its group 0.
+#[derive(Debug)]
+pub(super) struct Pass {
+    pub(super) pass: ComputePass,
+    pub(super) group: HeldGroup,
+}
+
+/// All of a variant's.
+#[derive(Debug)]
+pub(super) struct Passes {
+    pub(super) find_facing: Pass,
+    pub(super) extract: Pass,
+    pub(super) list_edges: Pass,
+    pub(super) count: Pass,
+    pub(super) ask: Pass,
+    pub(super) trace: Pass,
+    pub(super) write_group: HeldGroup,
+    pub(super) write: VisibilityPass,
+}
+
+/// Which of groups 1 to 3 a pass binds.
+#[derive(Clone, Copy)]
+enum Binds {
+    Triangles,
+    TrianglesAndReceivers,
+    All,
+}
+
+impl Passes {
+    pub(super) fn new(
+        device: &wgpu::Device,
+        variant: Variant,
+        scene: &SceneBindings,
+        receivers: &Receivers,
+        visibility: wgpu::TextureFormat,
+    ) -> Self {
+        const READ: wgpu::BindingType = binding::STORAGE;
+        const WRITE: wgpu::BindingType = binding::STORAGE_WRITE;
+        let stages = wgpu::ShaderStages::FRAGMENT | wgpu::ShaderStages::COMPUTE;
+        let group = |label, types: &[wgpu::BindingType]| {
+            HeldGroup::new(device, label, stages, &[&[binding::UNIFORM], types].concat())
+        };
+        let compute = |label, wgsl, entry, binds, own: &HeldGroup| {
+            let (triangles, cutouts) = (Some(&scene.triangles_layout), Some(&scene.cutouts_layout));
+            let groups = match binds {
+                Binds::Triangles => vec![Some(own.layout()), triangles],
+                Binds::TrianglesAndReceivers => {
+                    vec![Some(own.layout()), triangles, None, Some(receivers.layout())]
+                }
+                Binds::All => vec![Some(own.layout()), triangles, cutouts, Some(receivers.layout())],
+            };
+            ComputePass::new(device, label, wgsl, entry, &groups)
+        };
+        let pass = |label, wgsl, entry, binds, types: &[wgpu::BindingType]| {
+            let group = group(label, types);
+            Pass { pass: compute(label, wgsl, entry, binds, &group), group }
+        };
+        let lit = Binds::TrianglesAndReceivers;
+        let sides = if variant == Variant::Exact { "find_sides" } else { "find_layers" };
+        let exact = variant == Variant::Exact;
+        let trace = pass("wedges traced", shaders::RAYS, "trace", Binds::All, &[READ, READ, WRITE]);
+        let ask = if exact {
+            pass("wedges rays", shaders::RAYS, "ask", Binds::All, &[READ, READ, WRITE])
+        } else {
+            pass("wedges layers", shaders::LAYERS, "add_layers", lit, &[READ, READ, READ, WRITE])
+        };
+        let count = if exact {
+            pass("wedges exact", shaders::EXACT, "count", lit, &[READ, READ, READ, READ, WRITE])
+        } else {
+            pass("wedges coverage", shaders::COVERAGE, "add", lit, &[READ, READ, READ, WRITE])
+        };
+        let write_group = group("wedges write", &[READ]);
+        let write = VisibilityPass::new(
+            device,
+            &VisibilityPassParts {
+                label: "wedges write",
+                wgsl: shaders::WRITE,
+                fragment: "write",
+                own: write_group.layout(),
+                scene,
+                receivers,
+                format: visibility,
+            },
+        );
+        let extract = [READ, READ, READ, WRITE, WRITE, WRITE];
+        Self {
+            find_facing: pass(
+                "wedges facing",
+                shaders::FACING,
+                sides,
+                Binds::Triangles,
+                &[READ, WRITE, WRITE],
+            ),
+            extract: pass(
+                "wedges silhouette",
+                shaders::SILHOUETTE,
+                "extract_silhouette",
+                Binds::Triangles,
+                &extract,
+            ),
+            list_edges: pass("wedges blocks", shaders::BLOCKS, "list_edges", lit, &[READ, READ, WRITE]),
+            count,
+            ask,
+            trace,
+            write_group,
+            write,
+        }
+    }
+}

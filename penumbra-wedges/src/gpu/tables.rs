@@ -1,0 +1,115 @@
+//! What lives on the device as long as the scene does: edges with their faces, what each triangle is, the casters' trees.
+
+use scene_core::Scene;
+use scene_core::gpu::{CasterTrees, GpuError, GpuScene};
+use wgpu::util::DeviceExt as _;
+
+use crate::casters::{Casters, has_edges};
+use crate::edges::is_flat;
+use crate::error::WedgeError;
+
+/// Why the tables of a scene were not made.
+#[derive(Debug, thiserror::Error)]
+pub enum TablesError {
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The scene.
+    #[error(transparent)]
+    Wedges(#[from] WedgeError),
+}
+
+/// Buffers that depend on the geometry alone.
+#[derive(Debug)]
+pub struct Tables {
+    /// The scene's buffers they were made for.
+    made_for: [wgpu::Buffer; 2],
+    /// Four words an edge: two vertices; twice where its incidences start, and 1 if its two faces lie in one plane on both
+    /// sides of it; how many incidences.
+    pub edges: wgpu::Buffer,
+    /// Twice the face, and 1 if it runs along the edge.
+    pub incident: wgpu::Buffer,
+    /// Two bits a triangle: whether it is a solid caster, and whether it is part of a closed body.
+    pub kinds: wgpu::Buffer,
+    /// Nodes of the trees.
+    pub nodes: wgpu::Buffer,
+    /// Their triangles and objects.
+    pub leaves: wgpu::Buffer,
+    /// Edges.
+    pub edge_count: u32,
+    /// Incidences.
+    pub incident_count: u32,
+    /// Triangles of the scene.
+    pub triangles: u32,
+    /// Nodes of solid casters.
+    pub solid_nodes: u32,
+    /// Nodes in all.
+    pub all_nodes: u32,
+    /// The first caster with a mask.
+    pub masked: Option<String>,
+}
+
+impl Tables {
+    /// Builds and uploads the tables of `scene`, whose geometry is `geometry`.
+    ///
+    /// # Errors
+    /// More triangles than can be numbered, or an array larger than the device binds in one piece.
+    pub fn new(device: &wgpu::Device, scene: &GpuScene<'_>, geometry: &Scene) -> Result<Self, TablesError> {
+        let casters = Casters::new(geometry)?;
+        let trees = CasterTrees::new(geometry, &casters.tree);
+        let topology = &casters.topology;
+        let (mut edges, mut incident) = (Vec::with_capacity(topology.len()), Vec::new());
+        for (edge, [a, b]) in topology.vertices().iter().enumerate() {
+            let faces = topology.faces(edge);
+            let lies_flat = matches!(faces, [x, y] if is_flat(geometry, topology, edge, *x, *y));
+            edges.push([*a, *b, (incident.len() as u32) << 1 | u32::from(lies_flat), faces.len() as u32]);
+            incident.extend(faces.iter().map(|f| f.face() << 1 | u32::from(f.sign() > 0)));
+        }
+        let triangles = geometry.triangles().len();
+        let closed = casters.closed_faces();
+        let mut kinds = vec![0_u32; triangles.div_ceil(16)];
+        for triangle in geometry.objects().iter().filter(|o| has_edges(o)).flat_map(|o| o.triangles.clone()) {
+            kinds[triangle / 16] |= (1 | u32::from(closed[triangle]) << 1) << (2 * (triangle % 16));
+        }
+        let limits = device.limits();
+        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let buffer = |what: &'static str, bytes: &[u8]| {
+            if bytes.len() as u64 > limit {
+                return Err(GpuError::TooLarge { what, bytes: bytes.len() as u64, limit });
+            }
+            Ok(device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(what),
+                // A binding must not be empty.
+                contents: if bytes.is_empty() { &[0; 64] } else { bytes },
+                usage: wgpu::BufferUsages::STORAGE,
+            }))
+        };
+        Ok(Self {
+            made_for: [scene.positions.clone(), scene.triangles.clone()],
+            edges: buffer("edges", bytemuck::cast_slice(&edges))?,
+            incident: buffer("faces of edges", bytemuck::cast_slice(&incident))?,
+            kinds: buffer("kinds of triangles", bytemuck::cast_slice(&kinds))?,
+            nodes: buffer("nodes of the casters' tree", bytemuck::cast_slice(&trees.nodes))?,
+            leaves: buffer("leaves of the casters' tree", bytemuck::cast_slice(&trees.leaves))?,
+            edge_count: edges.len() as u32,
+            incident_count: incident.len() as u32,
+            triangles: triangles as u32,
+            solid_nodes: trees.solid,
+            all_nodes: trees.nodes.len() as u32,
+            masked: casters.masked().map(|object| object.name.clone()),
+        })
+    }
+
+    /// Whether they are those of `scene`.
+    pub fn are_of(&self, scene: &GpuScene<'_>) -> bool {
+        self.made_for[0] == *scene.positions && self.made_for[1] == *scene.triangles
+    }
+
+    /// Bytes held on the device.
+    pub fn bytes(&self) -> u64 {
+        [&self.edges, &self.incident, &self.kinds, &self.nodes, &self.leaves]
+            .into_iter()
+            .map(wgpu::Buffer::size)
+            .sum()
+    }
+}
