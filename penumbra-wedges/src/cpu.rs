@@ -1,9 +1,9 @@
 //! The CPU path: tiles, the wedges that each is in, and the pixels in those.
 //!
-//! The image is cut into strips of tiles of 8 × 8 pixels, a strip into runs of eight tiles. What a strip sees is in a box,
-//! and a wedge outside of that box changes none of its pixels; the others are asked again for each run, for each tile, and at
-//! last for each pixel (Szabó, 7.8: a stencil there, half-spaces here, which are stricter, since they bound the wedge on
-//! all sides). Only pixels inside of a wedge run the inner loop of [`exact`](crate::exact),
+//! The image is cut into tiles of 8 × 8 pixels. What a tile sees is in a box, and a wedge outside of that box changes none of its
+//! pixels; the others are asked again for each pixel (Szabó, 7.8: a stencil there, half-spaces here, which are
+//! stricter, since they bound the wedge on all sides). Most edges are left out in runs, by the tile's [`Shaft`]; for
+//! `interpolated`, whose wedges are wider, by boxes of whole strips of tiles and of runs of eight tiles first. Only pixels inside of a wedge run the inner loop of [`exact`](crate::exact),
 //! [`coverage`](crate::coverage) or [`interpolated`](crate::interpolated).
 
 use fearless_simd::{Level, dispatch};
@@ -17,6 +17,7 @@ use crate::exact::{Exact, Scratch, Work};
 use crate::interpolated::Interpolated;
 use crate::params::{Variant, WedgeParams};
 use crate::receiver::{Asked, Receiver};
+use crate::shaft::{EdgeGroups, Shaft};
 use crate::wedge::Wedge;
 use crate::wedges::Wedges;
 
@@ -114,6 +115,21 @@ fn keep(wedges: &[Wedge], edges: impl Iterator<Item = u32>, bounds: &Bounds, kep
     }
 }
 
+/// The same for those of all edges whose groups the box's shaft does not miss.
+#[inline(always)]
+fn keep_by_shaft(wedges: &Wedges, groups: &EdgeGroups, bounds: &Bounds, kept: &mut Vec<u32>) {
+    let (center, half) = ((bounds.min + bounds.max) * 0.5, (bounds.max - bounds.min) * 0.5);
+    kept.clear();
+    if !bounds.is_empty() {
+        let shaft = Shaft::new(&wedges.light, center, half);
+        groups.visit(&shaft, wedges.wedges.len(), |edge| {
+            if wedges.wedges[edge].touches(center, half) {
+                kept.push(edge as u32);
+            }
+        });
+    }
+}
+
 /// `shade.wedges`: V where a surface is seen, NaN elsewhere.
 pub fn shade(
     answer: &Answer<'_>,
@@ -194,12 +210,21 @@ impl Strip<'_> {
             asked.push(known);
         }
         let whole = bounds.iter().fold(Bounds::EMPTY, |sum, tile| sum.with(*tile));
-        keep(wedges, 0..wedges.len() as u32, &whole, of_strip);
+        let groups = exact.wedges.groups.as_ref();
+        if groups.is_none() {
+            keep(wedges, 0..wedges.len() as u32, &whole, of_strip);
+        }
         for (run, tiles) in bounds.chunks(RUN).enumerate() {
             let whole = tiles.iter().fold(Bounds::EMPTY, |sum, tile| sum.with(*tile));
-            keep(wedges, of_strip.iter().copied(), &whole, of_run);
+            if groups.is_none() {
+                keep(wedges, of_strip.iter().copied(), &whole, of_run);
+            }
             for (tile, bounds) in tiles.iter().enumerate() {
-                keep(wedges, of_run.iter().copied(), bounds, of_tile);
+                if let Some(groups) = groups {
+                    keep_by_shaft(exact.wedges, groups, bounds, of_tile);
+                } else {
+                    keep(wedges, of_run.iter().copied(), bounds, of_tile);
+                }
                 if !bounds.is_empty() {
                     scratch.work.tiles += 1;
                     scratch.work.free_tiles += u64::from(of_tile.is_empty());

@@ -16,6 +16,7 @@ pub mod layers;
 mod params;
 pub mod receiver;
 pub mod samples;
+pub mod shaft;
 mod technique;
 pub mod wedge;
 pub mod wedges;

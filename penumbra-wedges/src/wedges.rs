@@ -12,6 +12,7 @@ use crate::edges::{CandidateEdge, Edges, FaceSide, may_touch, side_of};
 use crate::interpolated::{Side, wedge_of};
 use crate::params::{Variant, WedgeParams};
 use crate::samples::{PATTERNS, Samples};
+use crate::shaft::EdgeGroups;
 use crate::wedge::Wedge;
 
 /// The wedges of all edges that matter.
@@ -23,6 +24,8 @@ pub struct Wedges {
     pub edges: Edges,
     /// The wedge of each edge.
     pub wedges: Vec<Wedge>,
+    /// Boxes around runs of edges; `None` for `interpolated`, whose wedges are not bounded by the ways to the light.
+    pub groups: Option<EdgeGroups>,
     /// Samples of the light, one pattern for each pixel of a tile.
     pub patterns: Vec<Samples>,
     /// Faces whose shadow has no edges to be counted: those that touch the light, or have a mask.
@@ -89,6 +92,8 @@ impl Wedges {
             };
             edges.map(wedge).collect()
         });
+        let groups = (params.variant != Variant::Interpolated)
+            .then(|| report.time("prepare.groups", |_| EdgeGroups::new(&edges.candidates)));
         let middle = from_middle.then_some(FromMiddle { facing, sides });
         let patterns = report.time("prepare.samples", |_| {
             let is_round = !matches!(area.shape, LightShape::Rect { .. });
@@ -98,7 +103,7 @@ impl Wedges {
         let traced_count = traced.len();
         let traced =
             report.time("prepare.traced", |_| (!traced.is_empty()).then(|| Bvh::of_triangles(scene, traced)));
-        Self { light: area, edges, wedges, patterns, traced, traced_count, middle }
+        Self { light: area, edges, wedges, groups, patterns, traced, traced_count, middle }
     }
 
     /// Bytes held.
@@ -108,6 +113,7 @@ impl Wedges {
         let middle = self.middle.as_ref();
         self.edges.bytes()
             + size_of_val(&self.wedges[..])
+            + self.groups.as_ref().map_or(0, EdgeGroups::bytes)
             + samples
             + self.traced.as_ref().map_or(0, Bvh::bytes)
             + middle.map_or(0, |m| size_of_val(&m.facing[..]) + size_of_val(&m.sides[..]))
