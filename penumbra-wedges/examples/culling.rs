@@ -28,12 +28,14 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn culling() -> Result<(), Box<dyn Error>> {
     println!("| scene | edges | variant | all wedges, ms | culled, ms | pays | µs a penumbra pixel |");
     println!("| --- | --- | --- | --- | --- | --- | --- |");
-    for (spec, size) in [("log-cabin", [192, 192]), ("park", [64, 48])] {
+    // All wedges of a park, asked by every pixel, take minutes with the slowest variant.
+    for (spec, size) in [("log-cabin", [192, 192]), ("park", [192, 192])] {
         let setup = scenes::build(spec, 0.0)?;
         let camera = setup.camera.with_size(size[0], size[1]);
         let gbuffer = raster::render_gbuffer(&setup.scene, &camera);
         let casters = Casters::new(&setup.scene)?;
-        for variant in [Variant::Interpolated, Variant::Coverage, Variant::Exact] {
+        let variants = [Variant::Coverage, Variant::Exact, Variant::Interpolated];
+        for &variant in &variants[..if spec == "park" { 2 } else { 3 }] {
             let mut took = Vec::new();
             let mut images = Vec::new();
             let (mut edges, mut each) = (0, 0.0);

@@ -26,29 +26,21 @@
 use std::f64::consts::TAU;
 
 use glam::DVec2;
-use scene_core::Scene;
-use scene_core::bvh::Bvh;
 
 use crate::area_light::Outline;
 use crate::chord::Chord;
-use crate::exact::Work;
+use crate::exact::{Exact, Work};
 use crate::layers::layers_before;
 use crate::receiver::Receiver;
-use crate::wedges::{FromMiddle, Wedges};
+use crate::wedges::FromMiddle;
 
 /// What is asked for V.
 #[derive(Clone, Copy, Debug)]
 pub struct Coverage<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// All casters.
-    pub tree: &'a Bvh,
-    /// Edges and wedges.
-    pub wedges: &'a Wedges,
+    /// Scene, tree, edges and wedges.
+    pub all: Exact<'a>,
     /// Layers.
     pub middle: &'a FromMiddle,
-    /// Look only at edges in whose wedge the receiver is.
-    pub skip: bool,
 }
 
 /// The share of the light behind a chord, as seen from its middle: positive if the chord runs counter-clockwise around it.
@@ -107,13 +99,13 @@ impl Coverage<'_> {
     #[inline(always)]
     pub fn unclamped(&self, receiver: &Receiver, edges: &[u32], work: &mut Work) -> Option<f64> {
         work.asked += 1;
-        let wedges = self.wedges;
+        let Exact { scene, tree, wedges, skip } = self.all;
         let frame = wedges.light.frame(receiver.place())?;
         let (origin, place) = (receiver.origin, receiver.place());
         let (mut sum, mut crossed) = (0.0, false);
         work.pairs += edges.len() as u64;
         for &index in edges {
-            if self.skip && !wedges.wedges[index as usize].holds(place) {
+            if skip && !wedges.wedges[index as usize].holds(place) {
                 continue;
             }
             work.inside += 1;
@@ -128,10 +120,10 @@ impl Coverage<'_> {
         let center = wedges.light.center();
         if !crossed {
             work.rays += 1;
-            return Some(if self.tree.is_occluded(origin, center) { 0.0 } else { 1.0 });
+            return Some(if tree.is_occluded(origin, center) { 0.0 } else { 1.0 });
         }
         work.rays += 1;
-        let layers = layers_before(self.scene, self.tree, &self.middle.facing, origin, center);
+        let layers = layers_before(scene, tree, &self.middle.facing, origin, center);
         Some(1.0 - (f64::from(layers) + sum))
     }
 }

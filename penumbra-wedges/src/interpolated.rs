@@ -20,16 +20,14 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use scene_core::Scene;
-use scene_core::bvh::Bvh;
 
 use crate::area_light::{AreaLight, LightShape};
 use crate::edges::CandidateEdge;
-use crate::exact::Work;
+use crate::exact::{Exact, Work};
 use crate::layers::layers_before;
 use crate::receiver::Receiver;
 use crate::wedge::Wedge;
-use crate::wedges::{FromMiddle, Wedges};
+use crate::wedges::FromMiddle;
 
 /// A side plane of a wedge.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,16 +131,10 @@ fn outward_normal(light: &AreaLight, edge: &CandidateEdge) -> DVec3 {
 /// What is asked for V.
 #[derive(Clone, Copy, Debug)]
 pub struct Interpolated<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// All casters.
-    pub tree: &'a Bvh,
-    /// Edges and wedges.
-    pub wedges: &'a Wedges,
+    /// Scene, tree, edges and wedges.
+    pub all: Exact<'a>,
     /// Layers and side planes.
     pub middle: &'a FromMiddle,
-    /// Look only at edges in whose wedge the receiver is.
-    pub skip: bool,
 }
 
 impl Interpolated<'_> {
@@ -150,12 +142,12 @@ impl Interpolated<'_> {
     #[inline(always)]
     pub fn unclamped(&self, receiver: &Receiver, edges: &[u32], work: &mut Work) -> f64 {
         work.asked += 1;
-        let wedges = self.wedges;
+        let Exact { scene, tree, wedges, skip } = self.all;
         let place = receiver.place();
         let (mut sum, mut inside) = (0.0, false);
         work.pairs += edges.len() as u64;
         for &index in edges {
-            if self.skip && !wedges.wedges[index as usize].holds(place) {
+            if skip && !wedges.wedges[index as usize].holds(place) {
                 continue;
             }
             work.inside += 1;
@@ -170,9 +162,9 @@ impl Interpolated<'_> {
         let center = wedges.light.center();
         work.rays += 1;
         let layers = if inside {
-            layers_before(self.scene, self.tree, &self.middle.facing, receiver.origin, center)
+            layers_before(scene, tree, &self.middle.facing, receiver.origin, center)
         } else {
-            i32::from(self.tree.is_occluded(receiver.origin, center))
+            i32::from(tree.is_occluded(receiver.origin, center))
         };
         1.0 - f64::from(layers) + sum
     }

@@ -190,11 +190,16 @@ fn unclamped_sums_are_shares() {
             let Some(Answer::Coverage(coverage)) = prepared.answer() else {
                 panic!("coverage was asked for")
             };
-            let edges: Vec<u32> = (0..coverage.wedges.wedges.len() as u32).collect();
+            let edges: Vec<u32> = (0..coverage.all.wedges.wedges.len() as u32).collect();
             let (mut work, mut asked) = (Work::default(), 0);
             for pixel in (0..gbuffer.pixel_count()).filter(|&pixel| gbuffer.object[pixel] == 0) {
-                let known =
-                    Receiver::at(&scene, &gbuffer, &coverage.wedges.light, scene.bounds().magnitude(), pixel);
+                let known = Receiver::at(
+                    &scene,
+                    &gbuffer,
+                    &coverage.all.wedges.light,
+                    scene.bounds().magnitude(),
+                    pixel,
+                );
                 let Asked::Yes(receiver) = known else { continue };
                 let v =
                     coverage.unclamped(&receiver, &edges, &mut work).expect("the floor is below the light");
