@@ -87,7 +87,7 @@ impl ContactHardening {
             skip: self.params.skip,
             ..Default::default()
         };
-        let maps = LightMaps::draw(query.scene, query.light, &settings, &mut report, |_, _, _| None);
+        let maps = LightMaps::draw_near(query.scene, query.light, &settings, &mut report);
         let (prepared, rest) = self.prepare_with(maps, query)?;
         let bytes = report.bytes + rest.bytes;
         report.merge(&rest);
@@ -156,9 +156,12 @@ impl PreparedContactHardening<'_> {
             }
             None => None,
         };
-        let mut map = report.time("shade.distance", |_| {
-            distance_map::distance_map(self.look_ups.maps(), gbuffer, hard.as_ref(), visibility)
-        });
+        // Where the scene lies far from zero, its own coordinates: see `Origin`.
+        let maps = self.look_ups.maps();
+        let (gbuffer, camera) = (maps.origin.gbuffer(gbuffer), maps.origin.camera(camera));
+        let gbuffer = gbuffer.as_ref();
+        let mut map = report
+            .time("shade.distance", |_| distance_map::distance_map(maps, gbuffer, hard.as_ref(), visibility));
         if self.params.show == Show::Distance {
             show::distance(&map, visibility);
             return Ok(report);
@@ -168,7 +171,7 @@ impl PreparedContactHardening<'_> {
                 let pyramid = report.time("shade.pyramid", |_| ShadowPyramid::new(&map));
                 let physical = Physical {
                     params: &self.params,
-                    maps: self.look_ups.maps(),
+                    maps,
                     look_ups: &self.look_ups,
                     gbuffer,
                     distance: &map,
@@ -180,7 +183,7 @@ impl PreparedContactHardening<'_> {
             }
             Scaling::Paper => report.time("shade.filter", |report| {
                 let paper = Paper { params: &self.params, gbuffer, kernel: &self.kernel };
-                paper.scale(&self.look_ups.maps().light, &mut map);
+                paper.scale(&maps.light, &mut map);
                 cpu::filter_as_published(&paper, &mut map, visibility, report);
             }),
         }

@@ -23,7 +23,7 @@ use gnomon_shadow_map::cpu::answer_points;
 use gnomon_shadow_map::light_maps::LightMaps;
 use gnomon_shadow_map::receiver_plane::plane_tolerance;
 use scene_core::geometry::Aabb;
-use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage, relevance};
+use scene_core::{Camera, GBuffer, Light, Origin, Report, Scene, VisibilityImage, relevance};
 
 pub use choice::Parametrisation;
 pub use lookup::Occluder;
@@ -93,18 +93,25 @@ impl Psm {
         gbuffer: &GBuffer,
     ) -> (PreparedPsm<'a>, Report) {
         let (mut report, params) = (Report::default(), self.params);
-        let tolerance = plane_tolerance(scene.bounds(), light);
-        let casters = relevance::told_apart(scene, light, tolerance);
+        // Where the scene lies far from zero, its own coordinates.
+        let origin = Origin::near(scene.bounds());
+        let (scene, light, camera) = (origin.scene(scene), origin.light(light), origin.camera(camera));
+        let gbuffer = origin.gbuffer(gbuffer);
+        let own = (!origin.is_world()).then(|| PointClouds::new(&scene));
+        let clouds = own.as_ref().unwrap_or(clouds);
+        let tolerance = plane_tolerance(scene.bounds(), &light);
+        let casters = relevance::told_apart(&scene, &light, tolerance);
         report.skip("casters", casters.backdrops.len() as u64);
         let bounds = casters.drawn.iter().fold(Aabb::EMPTY, |sum, object| sum.union(object.bounds));
-        let views = views::map_views(scene, light, camera, gbuffer, bounds, &params, &mut report);
-        let maps = report
-            .time("prepare.maps", |report| cpu::render_maps(scene, &casters, clouds, views, &params, report));
+        let views = views::map_views(&scene, &light, &camera, &gbuffer, bounds, &params, &mut report);
+        let maps = report.time("prepare.maps", |report| {
+            cpu::render_maps(&scene, &casters, clouds, views, &params, report)
+        });
         report.bytes = maps.iter().map(|map| map.triangles.len() as u64 * 4).sum::<u64>() + clouds.bytes();
-        let backdrops = casters.backdrops;
-        let tolerance = lookup::tolerance(scene.bounds(), light);
-        let questions = LightMaps { scene, light: *light, maps: Vec::new(), backdrops, tolerance };
-        (PreparedPsm { questions, maps, frame: ViewFrame::new(camera), params }, report)
+        let backdrops = casters.backdrops.into_iter().cloned().collect();
+        let tolerance = lookup::tolerance(scene.bounds(), &light);
+        let questions = LightMaps { origin, scene, light, maps: Vec::new(), backdrops, tolerance };
+        (PreparedPsm { questions, maps, frame: ViewFrame::new(&camera), params }, report)
     }
 }
 
@@ -124,7 +131,8 @@ impl PreparedPsm<'_> {
     /// NaN elsewhere. A receiver of another G-buffer that lies in no map is taken for lit.
     pub fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Report {
         let mut report = Report::default();
-        report.time("shade.lookup", |_| cpu::shade(self, gbuffer, visibility));
+        let gbuffer = self.questions.origin.gbuffer(gbuffer);
+        report.time("shade.lookup", |_| cpu::shade(self, &gbuffer, visibility));
         report
     }
 
@@ -134,9 +142,10 @@ impl PreparedPsm<'_> {
     /// has more is left alone.
     pub fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Report {
         let mut report = Report::default();
-        let LightMaps { scene, light, tolerance, .. } = &self.questions;
+        let LightMaps { origin, scene, light, tolerance, .. } = &self.questions;
         report.time("shade.lookup", |_| {
             answer_points(points, visibility, |point| {
+                let point = origin.point(point);
                 if !point.is_finite() {
                     return f32::NAN;
                 }

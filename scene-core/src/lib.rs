@@ -16,6 +16,7 @@
 //! | [`mod@reference`] | ray-traced ground truth and which pixels may be compared |
 //! | [`relevance`] | what light and camera make irrelevant |
 //! | [`metrics`] | errors of a visibility image |
+//! | [`origin`] | coordinates counted from the scene, where it lies far from zero |
 //! | [`technique`] | the [`ShadowTechnique`] trait, settings, reports |
 //! | `gpu` | its GPU half, with the feature of that name |
 //!
@@ -35,6 +36,7 @@ pub mod gpu;
 pub mod io;
 pub mod light;
 pub mod metrics;
+pub mod origin;
 pub mod raster;
 pub mod reference;
 pub mod relevance;
@@ -48,6 +50,7 @@ pub use camera::Camera;
 pub use gbuffer::GBuffer;
 pub use geometry::{Scene, TriangleMesh};
 pub use light::Light;
+pub use origin::Origin;
 pub use report::Report;
 pub use setup::SceneSetup;
 pub use technique::{PreparedShadow, ShadowTechnique};

@@ -7,6 +7,7 @@
 //! `shade` draws the maps, as only there the samples are known; they depend on nothing but the G-buffer and so stand
 //! still when the camera does. Lights at a place have no cascades: they are shaded as by `hard`.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use glam::{Mat3, Vec3};
@@ -14,7 +15,7 @@ use rayon::prelude::*;
 use scene_core::geometry::{Aabb, Object};
 use scene_core::light::LightPoint;
 use scene_core::relevance::{self, Backdrops, CasterChunks, Receivers, TileBounds};
-use scene_core::{GBuffer, Light, Report, Scene, VisibilityImage};
+use scene_core::{GBuffer, Light, Origin, Report, Scene, VisibilityImage};
 
 use crate::cascades::{self, MAX_CASCADES, Samples};
 use crate::cpu;
@@ -125,9 +126,10 @@ impl<'a> Cascaded<'a> {
                 self.casters.drawn.iter().map(|object| object.triangles.clone()).collect()
             };
             let maps = report.time("shade.maps", |_| cpu::render_maps(self.scene, &ranges, &views, size));
-            let backdrops = self.casters.backdrops.clone();
+            let backdrops = self.casters.backdrops.iter().copied().cloned().collect();
             let maps = LightMaps {
-                scene: self.scene,
+                origin: Origin::WORLD,
+                scene: Cow::Borrowed(self.scene),
                 light: self.light,
                 maps,
                 backdrops,

@@ -25,7 +25,7 @@ impl<'a> FilterMaps<'a> {
     /// `prepare.filter`.
     pub fn new(maps: LightMaps<'a>, skip: bool, report: &mut Report) -> Self {
         let (planes, pyramids) = report.time("prepare.filter", |_| {
-            let planes = light_side_planes(maps.scene, maps.light.center());
+            let planes = light_side_planes(&maps.scene, maps.light.center());
             (planes, maps.maps.iter().map(|view| DepthPyramid::new(&view.map)).collect::<Vec<_>>())
         });
         let bytes = pyramids.iter().map(DepthPyramid::bytes).sum::<u64>();

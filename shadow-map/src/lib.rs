@@ -138,7 +138,7 @@ impl ShadowMap {
         &self,
         scene: &'a Scene,
         light: &Light,
-        choose: impl FnOnce(&Backdrops<'a>, &[LightView], &mut Report) -> Option<RelevantCasters>,
+        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<RelevantCasters>,
     ) -> (PreparedShadowMap<'a>, Report) {
         let (mut report, params) = (Report::default(), &self.params);
         let draw = |report: &mut Report| LightMaps::draw(scene, light, params, report, choose);

@@ -1,5 +1,6 @@
 //! The maps of one light and what their texels stand for: what every variant looks receivers up in.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use glam::{Vec2, Vec3};
@@ -7,7 +8,7 @@ use scene_core::geometry::Object;
 use scene_core::light::LightPoint;
 use scene_core::raster::DepthMap;
 use scene_core::relevance::{self, Backdrops, RelevantCasters};
-use scene_core::{GBuffer, Light, Report, Scene};
+use scene_core::{GBuffer, Light, Origin, Report, Scene};
 
 use crate::ShadowMapParams;
 use crate::cpu;
@@ -38,14 +39,16 @@ impl ShadowMapView {
 /// The maps of one light.
 #[derive(Clone, Debug)]
 pub struct LightMaps<'a> {
+    /// What coordinates of all that follows, and of all that is asked, are counted from.
+    pub origin: Origin,
     /// Geometry, for the planes of stored triangles.
-    pub scene: &'a Scene,
+    pub scene: Cow<'a, Scene>,
     /// The light.
     pub light: Light,
     /// Its maps.
     pub maps: Vec<ShadowMapView>,
     /// Casters that are in no map because no surface lies behind them; a free point may.
-    pub backdrops: Vec<&'a Object>,
+    pub backdrops: Vec<Object>,
     /// [`plane_tolerance`].
     pub tolerance: f32,
 }
@@ -84,12 +87,30 @@ impl<'a> LightMaps<'a> {
         light: &Light,
         params: &ShadowMapParams,
         report: &mut Report,
-        choose: impl FnOnce(&Backdrops<'a>, &[LightView], &mut Report) -> Option<RelevantCasters>,
+        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<RelevantCasters>,
     ) -> Self {
-        let tolerance = plane_tolerance(scene.bounds(), light);
+        Self::draw_in(Origin::WORLD, Cow::Borrowed(scene), *light, params, report, choose)
+    }
+
+    /// The same in coordinates counted [from the scene](Origin::near) if it lies far from zero. What is asked has to be
+    /// counted from [`origin`](Self::origin), too.
+    pub fn draw_near(scene: &'a Scene, light: &Light, params: &ShadowMapParams, report: &mut Report) -> Self {
+        let origin = Origin::near(scene.bounds());
+        Self::draw_in(origin, origin.scene(scene), origin.light(light), params, report, |_, _, _| None)
+    }
+
+    fn draw_in(
+        origin: Origin,
+        scene: Cow<'a, Scene>,
+        light: Light,
+        params: &ShadowMapParams,
+        report: &mut Report,
+        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<RelevantCasters>,
+    ) -> Self {
+        let tolerance = plane_tolerance(scene.bounds(), &light);
         let (casters, views) = report.time("prepare.views", |_| {
-            let casters = relevance::told_apart(scene, light, tolerance);
-            let views = light_views::light_views(scene, light, &casters.drawn, params.skips_faces());
+            let casters = relevance::told_apart(&scene, &light, tolerance);
+            let views = light_views::light_views(&scene, &light, &casters.drawn, params.skips_faces());
             (casters, views)
         });
         report.skip("casters", casters.backdrops.len() as u64);
@@ -99,9 +120,9 @@ impl<'a> LightMaps<'a> {
             None => casters.drawn.iter().map(|object| object.triangles.clone()).collect(),
         };
         let maps =
-            report.time("prepare.maps", |_| cpu::render_maps(scene, &ranges, &views.views, params.map_size));
-        let backdrops = casters.backdrops;
-        let maps = Self { scene, light: *light, maps, backdrops, tolerance };
+            report.time("prepare.maps", |_| cpu::render_maps(&scene, &ranges, &views.views, params.map_size));
+        let backdrops = casters.backdrops.into_iter().cloned().collect();
+        let maps = Self { origin, scene, light, maps, backdrops, tolerance };
         report.bytes += maps.bytes();
         maps
     }

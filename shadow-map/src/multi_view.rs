@@ -7,13 +7,15 @@
 //! Maps are drawn and looked up one after another, so memory does not grow with k. `shade` needs the receivers to leave
 //! out what none of them needs, so maps are drawn there, and hold for no longer.
 
+use std::borrow::Cow;
+
 use glam::Vec3;
 use rayon::prelude::*;
 use scene_core::geometry::Aabb;
 use scene_core::light::LightPoint;
 use scene_core::raster::RasterScratch;
 use scene_core::relevance::{self, CasterChunks, Receivers, TileBounds};
-use scene_core::{GBuffer, Light, Report, Scene, VisibilityImage};
+use scene_core::{GBuffer, Light, Origin, Report, Scene, VisibilityImage};
 
 use crate::cpu;
 use crate::light_maps::{LightMaps, ShadowMapView};
@@ -122,10 +124,11 @@ impl<'a> MultiView<'a> {
                 );
             });
             let light_maps = LightMaps {
-                scene: self.scene,
+                origin: Origin::WORLD,
+                scene: Cow::Borrowed(self.scene),
                 light,
                 maps: std::mem::take(&mut maps),
-                backdrops: casters.backdrops,
+                backdrops: casters.backdrops.into_iter().cloned().collect(),
                 tolerance,
             };
             report.bytes = report.bytes.max(light_maps.bytes());

@@ -28,7 +28,7 @@ pub(crate) struct ObjectId<'a> {
 
 impl<'a> ObjectId<'a> {
     pub(crate) fn new(maps: LightMaps<'a>, params: &ShadowMapParams, report: &mut Report) -> Self {
-        let objects = report.time("prepare.ids", |_| cpu::object_ids(maps.scene, &maps.maps));
+        let objects = report.time("prepare.ids", |_| cpu::object_ids(&maps.scene, &maps.maps));
         report.bytes += objects.iter().map(|ids| size_of_val(ids.as_slice()) as u64).sum::<u64>();
         Self { maps: FilterMaps::new(maps, params.skip, report), filter: Filter::new(params), objects }
     }

@@ -137,6 +137,19 @@ impl Scene {
         Ok(self.objects.len() as u32 - 1)
     }
 
+    /// The same with all coordinates less `origin`, each rounded once. Coordinates that overflow become infinite.
+    #[must_use]
+    pub fn counted_from(&self, origin: Vec3) -> Self {
+        let mut moved = self.clone();
+        moved.positions.iter_mut().for_each(|position| *position -= origin);
+        // Rounding keeps order: the bounds of what moved are what moved of the bounds.
+        let bounds = moved.objects.iter_mut().map(|object| &mut object.bounds).chain(&mut moved.bounds);
+        for bounds in bounds.filter(|bounds| !bounds.is_empty()) {
+            (bounds.min, bounds.max) = (bounds.min - origin, bounds.max - origin);
+        }
+        moved
+    }
+
     /// Vertex positions in world space.
     pub fn positions(&self) -> &[Vec3] {
         &self.positions
