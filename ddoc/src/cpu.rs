@@ -215,7 +215,7 @@ fn site_of(prepared: &PreparedDdoc<'_>, receiver: &Receiver) -> (Site, Option<Li
 
 /// How many faces lie between a receiver and the light's centre: the solid ones, those of masks, or what the map shows.
 fn before_center(prepared: &PreparedDdoc<'_>, view: usize, receiver: &Receiver, site: &Site) -> i32 {
-    let (layers, scene) = (&prepared.layers[view], prepared.base.scene);
+    let (layers, scene) = (&prepared.layers[view], prepared.base.scene.as_ref());
     let Some(place) = layers.image.place(receiver.point) else { return 0 };
     let center = prepared.base.light.center();
     let placed = Placed { receiver, place };

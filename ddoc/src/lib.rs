@@ -20,6 +20,7 @@ pub mod splat;
 mod technique;
 pub mod tiles;
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 
 use glam::{Vec2, Vec3};
@@ -29,7 +30,7 @@ use gnomon_shadow_map::light_views::light_views;
 use gnomon_shadow_map::receiver_plane::plane_tolerance;
 use scene_core::geometry::{Aabb, Object, TopologyError};
 use scene_core::light::{LightHull, LightPoint};
-use scene_core::{GBuffer, Light, Report, Scene, VisibilityImage, relevance};
+use scene_core::{GBuffer, Light, Origin, Report, Scene, VisibilityImage, relevance};
 
 use discontinuity::Discontinuities;
 use faces::Faces;
@@ -136,8 +137,14 @@ impl Ddoc {
         report.bytes += layers.iter().map(|layers| layers.bytes() as u64).sum::<u64>()
             + faces.iter().map(|faces| faces.lists().bytes() as u64).sum::<u64>()
             + size_of_val(&edges[..]) as u64;
-        let backdrops = casters.backdrops;
-        let base = LightMaps { scene, light: *light, maps: Vec::new(), backdrops, tolerance };
+        let base = LightMaps {
+            origin: Origin::WORLD,
+            scene: Cow::Borrowed(scene),
+            light: *light,
+            maps: Vec::new(),
+            backdrops: casters.backdrops.into_iter().cloned().collect(),
+            tolerance,
+        };
         let points = light_points::light_points(light, params.taps, params.seed);
         let DdocParams { variant, skip, .. } = *params;
         let prepared = PreparedDdoc { base, faces, layers, origin, edges, hull, points, variant, skip };
