@@ -76,10 +76,10 @@ impl Bvh {
     /// [`Bvh::occluded_from`] for at most 64 targets, as bits: bit i says that target i is blocked. Targets past
     /// the 64th are ignored.
     pub fn occluded_mask(&self, origin: Vec3, targets: &[LightPoint]) -> u64 {
-        if targets.len() <= FEW {
-            self.occluded_packed::<FEW>(origin, targets)
-        } else {
-            self.occluded_packed::<MAX_RAYS>(origin, targets)
+        match targets.len() {
+            0..=1 => self.occluded_packed::<1>(origin, targets),
+            ..=FEW => self.occluded_packed::<FEW>(origin, targets),
+            _ => self.occluded_packed::<MAX_RAYS>(origin, targets),
         }
     }
 
