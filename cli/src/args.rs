@@ -130,7 +130,7 @@ pub(crate) struct TruthArgs {
     pub(crate) exact: bool,
     /// Take as many samples a pixel as a standard error of about E takes, at most --samples
     ///
-    /// std_error.npy says what each pixel reached.
+    /// `gnomon reference` writes what each pixel reached beside its V.
     #[arg(long, value_name = "E", conflicts_with = "exact", value_parser = parse_fraction)]
     pub(crate) max_error: Option<f32>,
 }
