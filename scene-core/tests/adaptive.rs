@@ -66,7 +66,7 @@ fn a_hair_costs_all_samples() {
 #[test]
 fn a_small_error_is_all_samples_and_a_large_one_few() {
     let setup = scenes::build("ball", 0.0).unwrap();
-    let mut camera = setup.camera.clone();
+    let mut camera = setup.camera;
     (camera.width, camera.height) = (48, 36);
     let gbuffer = raster::render_gbuffer(&setup.scene, &camera);
     let (bvh, light) = (Bvh::casters(&setup.scene), &setup.lights[0]);
