@@ -11,6 +11,8 @@ use scene_core::{Light, Report, Scene};
 
 use crate::coverage::{Counter, Site, TileEdges};
 use crate::distortion_map::{Farthest, distortion_map};
+#[cfg(feature = "gpu")]
+use crate::grid::Grid;
 use crate::grid::TileLists;
 use crate::layers::{Layers, Placed};
 use crate::light_image::LightImage;
@@ -62,25 +64,41 @@ pub fn shade(
     let images: Vec<LightImage> = prepared.layers.iter().map(|layers| layers.image).collect();
     let lone = images.len() == 1;
     let tiles = report.time("shade.receivers", |_| Tiles::new(&images, lone, values, &site));
-    let maps: Vec<TileLists> = report.time("shade.splat", |_| {
-        let (edges, origin) = (&prepared.edges, prepared.origin);
-        let ends = |edge: usize| [edges[edge].a + origin, edges[edge].b + origin];
-        let splat = |(image, farthest): (&LightImage, &Farthest)| {
-            let reach = |edge: usize| {
-                let is_paper = prepared.variant == Variant::Paper;
-                is_paper.then(|| image.along(edges[edge].far + origin))
-            };
-            let (hull, skip) = (prepared.hull.as_ref(), prepared.skip);
-            distortion_map(image, &ends, &reach, edges.len(), hull, farthest, skip)
-        };
-        images.iter().zip(&tiles.farthest).map(splat).collect()
-    });
+    let maps = report.time("shade.splat", |_| splats(prepared, &tiles.farthest));
     if prepared.skip {
         report.skip("splats", maps.iter().map(|map| map.left_out).sum());
     }
     report.bytes += maps.iter().map(|map| map.bytes() as u64).sum::<u64>();
     report.time("shade.hard", |report| hard(prepared, &tiles, &maps, values, report, &site));
     report.time("shade.penumbra", |_| penumbra(prepared, &tiles, &maps, values, &site));
+}
+
+/// `shade.splat`: the splats of each view, over receivers as far as these.
+fn splats(prepared: &PreparedDdoc<'_>, farthest: &[Farthest]) -> Vec<TileLists> {
+    let (edges, origin) = (&prepared.edges, prepared.origin);
+    let ends = |edge: usize| [edges[edge].a + origin, edges[edge].b + origin];
+    let splat = |(layers, farthest): (&Layers, &Farthest)| {
+        let image = &layers.image;
+        let reach = |edge: usize| {
+            let is_paper = prepared.variant == Variant::Paper;
+            is_paper.then(|| image.along(edges[edge].far + origin))
+        };
+        let (hull, skip) = (prepared.hull.as_ref(), prepared.skip);
+        distortion_map(image, &ends, &reach, edges.len(), hull, farthest, skip)
+    };
+    prepared.layers.iter().zip(farthest).map(splat).collect()
+}
+
+/// The same over all surfaces of the scene that receive shadows: these hold for any camera.
+#[cfg(feature = "gpu")]
+pub(crate) fn splats_for_any_camera(prepared: &PreparedDdoc<'_>) -> Vec<TileLists> {
+    let lone = prepared.layers.len() == 1;
+    let of_scene = |layers: &Layers| {
+        let grid = Grid::new(layers.image.size, lone);
+        Farthest::of_scene(prepared.base.scene.as_ref(), &layers.image, grid)
+    };
+    let farthest: Vec<_> = prepared.layers.iter().map(of_scene).collect();
+    splats(prepared, &farthest)
 }
 
 /// `shade.hard`: receivers in tiles that no splat reaches.

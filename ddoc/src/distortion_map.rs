@@ -10,14 +10,19 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::Vec3;
+use rayon::prelude::*;
+use scene_core::Scene;
 use scene_core::light::LightHull;
 
 use crate::grid::{Grid, RATIO, Range, TileLists};
-use crate::light_image::LightImage;
+use crate::light_image::{Bounds, LightImage};
 use crate::splat::splat;
 
 /// How often a splat is cut to the receivers within its reach.
 const CUTS: usize = 3;
+
+/// How far beyond its bounds a surface is taken to reach, in texels, for the rounding of image coordinates.
+const SLACK: f32 = 0.25;
 
 /// The farthest receiver of every tile of every grid.
 #[derive(Debug)]
@@ -56,6 +61,41 @@ impl Farthest {
         if held.load(Ordering::Relaxed) < bits {
             held.fetch_max(bits, Ordering::Relaxed);
         }
+    }
+
+    /// Of all surfaces of a scene that receive shadows, whatever a camera sees of them: a triangle's farthest corner for
+    /// every tile that its image may touch.
+    pub fn of_scene(scene: &Scene, image: &LightImage, grid: Grid) -> Self {
+        let this = Self::new(grid);
+        let receives = scene.objects().iter().filter(|object| object.flags.receives);
+        for object in receives {
+            object.triangles.clone().into_par_iter().for_each(|triangle| {
+                let (mut bounds, mut along) = (Bounds::NONE, f32::NEG_INFINITY);
+                for corner in scene.corners(triangle) {
+                    // What reaches behind the light's plane may be seen anywhere.
+                    bounds = match image.place(corner) {
+                        Some(place) if bounds != Bounds::ALL => bounds.with(place),
+                        _ => Bounds::ALL,
+                    };
+                    along = along.max(image.along(corner));
+                }
+                grid.each_tile(bounds.grown(SLACK), &mut |tile| this.add(tile, along));
+            });
+        }
+        // What lies over a tile lies over the finer ones within.
+        for level in (1..grid.levels()).rev() {
+            let (below, above) = (grid.tiles_at(level - 1), grid.tiles_at(level));
+            let (to, from) = (grid.first_of(level - 1), grid.first_of(level));
+            for row in 0..below {
+                for column in 0..below {
+                    let at = from + ((row >> RATIO) * above + (column >> RATIO)) as usize;
+                    let held = this.bits[at].load(Ordering::Relaxed);
+                    this.bits[to + (row * below + column) as usize].fetch_max(held, Ordering::Relaxed);
+                }
+            }
+        }
+        this.finish();
+        this
     }
 
     /// Fills the coarser grids.

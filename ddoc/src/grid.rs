@@ -150,6 +150,21 @@ impl Grid {
         }
     }
 
+    /// Tiles a side of the finest grid.
+    pub fn tiles(&self) -> u32 {
+        self.tiles
+    }
+
+    /// Texels a side of such a tile.
+    pub fn texels(&self) -> u32 {
+        self.tile
+    }
+
+    /// Texels beside the map that tiles lie over, on each side.
+    pub fn margin(&self) -> u32 {
+        self.margin
+    }
+
     /// Texels of the map.
     pub fn size(&self) -> u32 {
         self.size
@@ -219,6 +234,24 @@ impl TileLists {
         })
     }
 
+    /// How much lies over the fullest tile of the finest grid, what the tiles above it hold included.
+    pub fn longest(&self) -> u32 {
+        let held = |tile: usize| self.first[tile + 1] - self.first[tile];
+        let mut above: Vec<u32> = vec![0];
+        for level in (0..self.grid.levels).rev() {
+            let (side, start) = (self.grid.tiles_at(level), self.grid.first_of(level));
+            let side_above = if level + 1 < self.grid.levels { self.grid.tiles_at(level + 1) } else { 1 };
+            let shift = if level + 1 < self.grid.levels { RATIO } else { u32::BITS - 1 };
+            let sum = |tile: u32| {
+                let (column, row) = (tile % side, tile / side);
+                let over = above[((row >> shift) * side_above + (column >> shift)) as usize];
+                over + held(start + tile as usize)
+            };
+            above = (0..side * side).map(sum).collect();
+        }
+        above.into_iter().max().unwrap_or(0)
+    }
+
     /// Whether nothing lies over a tile.
     pub fn is_clear(&self, tile: u32) -> bool {
         self.of(tile).next().is_none()
@@ -255,6 +288,19 @@ impl TileLists {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_fullest_tile_counts_what_lies_above_it() {
+        let grid = Grid::of_texels(64);
+        let squares = [(0.0, 0.5), (0.0, 60.0), (0.2, 0.7), (50.0, 50.5)];
+        let lists = TileLists::new(grid, squares.len(), |index, enter| {
+            let (min, max) = squares[index];
+            grid.each_tile(Bounds { min: Vec2::splat(min), max: Vec2::splat(max) }, enter);
+        });
+        assert_eq!(lists.longest(), 3);
+        let longest = (0..64 * 64).map(|tile| lists.of(tile).count()).max();
+        assert_eq!(longest, Some(3));
+    }
 
     #[test]
     fn a_range_holds_its_bounds_at_every_level() {

@@ -6,6 +6,8 @@ pub mod cpu;
 pub mod discontinuity;
 pub mod distortion_map;
 pub mod faces;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod grid;
 pub mod image_edges;
 pub mod layers;

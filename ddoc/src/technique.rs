@@ -5,8 +5,15 @@ use scene_core::technique::{
     Capability, Description, Params, PreparedShadow, ShadowQuery, ShadowTechnique, Support, TechniqueError,
     TechniqueFromParams,
 };
+#[cfg(feature = "gpu")]
+use scene_core::{
+    Camera,
+    gpu::{GpuGBuffer, GpuShadowQuery, GpuShadowTechnique, Recorder},
+};
 use scene_core::{GBuffer, Report, VisibilityImage};
 
+#[cfg(feature = "gpu")]
+use crate::gpu::DdocOnGpu;
 use crate::{Ddoc, DdocParams, PreparedDdoc, Variant};
 
 impl ShadowTechnique for Ddoc {
@@ -23,7 +30,13 @@ impl ShadowTechnique for Ddoc {
             Support::Approximate("the umbra is the hard shadow: penumbrae lie outside of it");
         let variant = self.params.variant;
         let support = |capability| match capability {
-            Capability::Gpu => Support::Unsupported("it has a CPU path only"),
+            Capability::Gpu if !cfg!(feature = "gpu") => {
+                Support::Unsupported("built without the feature 'gpu'")
+            }
+            Capability::Gpu if variant == Variant::Paper => {
+                Support::Unsupported("this variant has a CPU path only")
+            }
+            Capability::Gpu => Support::Exact,
             Capability::AlphaMask if variant == Variant::Ddoc => MASK,
             Capability::DirectionalLight
             | Capability::PointLight
@@ -54,6 +67,40 @@ impl ShadowTechnique for Ddoc {
         let (prepared, report) = Ddoc::prepare(self, query.scene, query.light)
             .map_err(|error| TechniqueError::Other(Box::new(error)))?;
         Ok((Box::new(prepared), report))
+    }
+
+    #[cfg(feature = "gpu")]
+    fn gpu(
+        &self,
+        device: &wgpu::Device,
+        visibility: wgpu::TextureFormat,
+    ) -> Result<Box<dyn GpuShadowTechnique>, TechniqueError> {
+        Ok(Box::new(DdocOnGpu::new(device, self.params, visibility)?))
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl GpuShadowTechnique for DdocOnGpu {
+    fn prepare(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        query: &GpuShadowQuery<'_>,
+    ) -> Result<Report, TechniqueError> {
+        DdocOnGpu::prepare(self, recorder, query)
+    }
+
+    fn shade(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        camera: &Camera,
+        gbuffer: &GpuGBuffer<'_>,
+        visibility: &wgpu::TextureView,
+    ) -> Result<Report, TechniqueError> {
+        DdocOnGpu::shade(self, recorder, camera, gbuffer, visibility)
+    }
+
+    fn survives_camera(&self) -> bool {
+        true
     }
 }
 
