@@ -78,7 +78,7 @@ impl Bvh {
     pub fn occluded_mask(&self, origin: Vec3, targets: &[LightPoint]) -> u64 {
         match targets.len() {
             0..=1 => self.occluded_packed::<1>(origin, targets),
-            ..=FEW => self.occluded_packed::<FEW>(origin, targets),
+            2..=FEW => self.occluded_packed::<FEW>(origin, targets),
             _ => self.occluded_packed::<MAX_RAYS>(origin, targets),
         }
     }
