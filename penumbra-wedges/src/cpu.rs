@@ -28,7 +28,7 @@ pub const TILE: usize = 8;
 const RUN: usize = 8;
 
 /// Edges for each sample of the light above which the pixels of a part of a tile are traced. It decides about time alone. Measured
-/// (README, `--example culling -- rays`): with up to four times as many edges as samples counting takes 0.89 of the time of
+/// (README, `--example what_culling_saves -- rays`): with up to four times as many edges as samples counting takes 0.89 of the time of
 /// tracing, with up to eight 1.14.
 pub const EDGES_A_RAY: usize = 4;
 

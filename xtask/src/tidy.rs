@@ -63,6 +63,7 @@ pub(crate) fn run() -> Result<(), CheckError> {
             &text("cli/src/techniques.rs"),
         ));
     }
+    broken.extend(same_examples(&files));
     let mut pictures = Vec::new();
     collect_with(root(), &[".png", ".jpg", ".svg", ".webp"], &mut pictures)?;
     for path in &pictures {
@@ -161,9 +162,32 @@ fn rule_of_picture(name: &str, bytes: u64) -> Option<String> {
     (bytes > MAX_PICTURE_BYTES).then(|| format!("{name}: {bytes} bytes, at most {MAX_PICTURE_BYTES}"))
 }
 
+/// Examples of one name: all crates build into one folder, and the last one built would be the one that runs.
+fn same_examples(files: &[PathBuf]) -> Vec<String> {
+    let mut examples: Vec<&PathBuf> = files
+        .iter()
+        .filter(|path| path.parent().is_some_and(|folder| folder.ends_with("examples")))
+        .collect();
+    examples.sort_by_key(|path| path.file_name());
+    let twice = examples.windows(2).filter(|pair| pair[0].file_name() == pair[1].file_name());
+    twice
+        .map(|pair| format!("{} and {}: two examples of one name", pair[0].display(), pair[1].display()))
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn examples_of_one_name_are_refused() {
+        let files = |names: &[&str]| names.iter().map(PathBuf::from).collect::<Vec<_>>();
+        assert!(
+            same_examples(&files(&["a/examples/x.rs", "b/examples/y.rs", "b/src/x.rs", "a/tests/x.rs"]))
+                .is_empty()
+        );
+        assert_eq!(same_examples(&files(&["a/examples/x.rs", "c/src/z.rs", "b/examples/x.rs"])).len(), 1);
+    }
 
     #[test]
     fn a_clean_file_passes() {

@@ -1,5 +1,5 @@
 //! Errors and milliseconds of every variant beside PCSS, against ray tracing:
-//! `cargo run --release -p gnomon-ddoc --example errors -- [--size WxH] [--samples N] [--stages] [SCENE…]`, of built-in scenes
+//! `cargo run --release -p gnomon-ddoc --example against_truth -- [--size WxH] [--samples N] [--stages] [SCENE…]`, of built-in scenes
 //! and scene files; all built-in scenes with a light of some extent if none is named.
 //!
 //! Below the table stands on how many scenes `ddoc` has the lower rmse than the variants of outer penumbrae, and than PCSS at

@@ -1,7 +1,7 @@
 //! Draws figures 7.4 and 7.5 of the paper in kind. Above: soft shadows of a large sphere light by `interpolated`, `coverage`
 //! and `exact`. Below: how many wedges each pixel lies in, for a sphere, a rect and a disk of the same reach over one box.
 //!
-//! `cargo run --release -p gnomon-penumbra-wedges --example figures -- FILE.png`
+//! `cargo run --release -p gnomon-penumbra-wedges --example wedge_figures -- FILE.png`
 
 use std::error::Error;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! What leaving wedges out saves, and from how many edges on it is cheaper to trace a tile's samples than to count.
 //!
-//! `cargo run --release -p gnomon-penumbra-wedges --example culling`
+//! `cargo run --release -p gnomon-penumbra-wedges --example what_culling_saves`
 
 use std::error::Error;
 use std::time::Instant;
