@@ -1,8 +1,8 @@
 //! What leaving out saves where a camera looks at a small part of a large scene: `prepare` and `shade` with and without
 //! `skip`, and that every pixel is the same.
 //!
-//! `cargo run --release --example close_up -- [RUNS] [SCENE]`: a forest of a million triangles, seen from a few steps away from
-//! the edge of its clearing. The bounds of runs of triangles, which hold as long as the scene does, are taken once and timed
+//! `cargo run --release --example close_up -- [RUNS] [SCENE]`: a forest of a million triangles, seen from a step away:
+//! a patch of its ground, a metre or so across. The bounds of runs of triangles, which hold as long as the scene does, are taken once and timed
 //! apart.
 
 use std::error::Error;
@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scene = &setup.scene;
     let camera = Camera {
         eye: Vec3::new(2.0, 1.7, 1.0),
-        target: Vec3::new(4.5, 0.2, -2.0),
+        target: Vec3::new(2.8, 0.0, 0.2),
         fov_y: 0.7,
         ..setup.camera.with_size(512, 512)
     };
@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         Light::Directional { direction, .. } => Light::Directional { direction, angular_radius: 0.0 },
         other => other,
     };
-    let lamp = Light::Point { position: camera.target + Vec3::new(-0.5, 1.5, 0.5) };
+    let lamp = Light::Point { position: camera.target + Vec3::new(-1.0, 4.0, 1.0) };
     for (variant, light, name) in [
         (Variant::Hard, sharp, "sun"),
         (Variant::Hard, lamp, "lamp"),

@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
-use scene_core::geometry::{Aabb, Object};
+use scene_core::geometry::Aabb;
 use scene_core::light::LightPoint;
 use scene_core::relevance::{self, Backdrops, CasterChunks, Receivers, TileBounds};
 use scene_core::{GBuffer, Light, Origin, Report, Scene, VisibilityImage};
@@ -20,7 +20,7 @@ use scene_core::{GBuffer, Light, Origin, Report, Scene, VisibilityImage};
 use crate::cascades::{self, MAX_CASCADES, Samples};
 use crate::cpu;
 use crate::light_maps::{LightMaps, ShadowMapView};
-use crate::light_views::LightView;
+use crate::light_views::{LightView, bounds_along};
 use crate::params::HARD_REACH;
 use crate::receiver_plane::plane_tolerance;
 use crate::view_casters::looked_up_behind;
@@ -53,11 +53,7 @@ pub(crate) fn drawn_bounds<'a>(
     axes: Mat3,
 ) -> (Backdrops<'a>, Aabb) {
     let casters = relevance::told_apart(scene, light, tolerance);
-    let light_from_world = axes.transpose();
-    let of = |object: &&Object| {
-        Aabb::from_points(scene.positions()[object.vertices.clone()].iter().map(|&p| light_from_world * p))
-    };
-    let bounds = casters.drawn.par_iter().map(of).reduce(|| Aabb::EMPTY, Aabb::union);
+    let bounds = bounds_along(scene, axes, &casters.drawn);
     (casters, bounds)
 }
 

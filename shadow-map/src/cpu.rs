@@ -23,6 +23,26 @@ pub fn render_maps(
     maps
 }
 
+/// [`render_maps`] with casters for each view. Where there are none the map is empty, and not drawn.
+pub fn render_maps_of(
+    scene: &Scene,
+    casters: &[Vec<Range<usize>>],
+    views: &[LightView],
+    size: u32,
+) -> Vec<ShadowMapView> {
+    let (mut scratch, texels) = (RasterScratch::new(), size as usize * size as usize);
+    let draw = |(&view, casters): (&LightView, &Vec<Range<usize>>)| {
+        if casters.is_empty() {
+            let map = DepthMap { width: size, height: size, depth: vec![0.0; texels] };
+            return ShadowMapView { view, map, triangles: vec![GBuffer::NOTHING; texels] };
+        }
+        let mut drawn = Vec::new();
+        render_maps_into(scene, casters, &[view], size, &mut scratch, &mut drawn);
+        drawn.remove(0)
+    };
+    views.iter().zip(casters).map(draw).collect()
+}
+
 /// [`render_maps`] into maps that are there already: what is drawn again and again allocates nothing.
 pub fn render_maps_into(
     scene: &Scene,

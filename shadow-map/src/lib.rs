@@ -31,7 +31,7 @@ pub mod view_casters;
 use std::fmt::Debug;
 
 use glam::Vec3;
-use scene_core::relevance::{self, Backdrops, CasterChunks, RelevantCasters};
+use scene_core::relevance::{self, Backdrops, CasterChunks, Receivers, RelevantCasters};
 use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
 
 use cascaded::Cascaded;
@@ -102,12 +102,23 @@ impl ShadowMap {
             let reach = self.params.reach_texels().filter(|_| self.params.skip)?;
             report.time("prepare.relevance", |report| {
                 let map_size = self.params.map_size;
-                let region = view_casters::looked_up(scene, light, camera, views, map_size, reach);
-                let kept = relevance::relevant_casters(scene, &region, chunks, |id| {
-                    let object = &scene.objects()[id as usize];
-                    !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
-                });
-                kept.book(report);
+                let receivers = Receivers::seen_by(scene, camera, light);
+                let of = |view: &LightView| {
+                    let seen = if views.len() > 1 {
+                        let sides = view_casters::looked_up_in(view, map_size, reach)?;
+                        receivers.clone().inside(&sides)
+                    } else {
+                        receivers.clone()
+                    };
+                    let region =
+                        view_casters::looked_up_behind(scene, light, &seen, &[*view], map_size, reach);
+                    Some(relevance::relevant_casters(scene, &region, chunks, |id| {
+                        let object = &scene.objects()[id as usize];
+                        !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
+                    }))
+                };
+                let kept = views.iter().map(of).collect::<Option<Vec<_>>>()?;
+                kept.iter().for_each(|kept| kept.book(report));
                 Some(kept)
             })
         })
@@ -138,7 +149,7 @@ impl ShadowMap {
         &self,
         scene: &'a Scene,
         light: &Light,
-        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<RelevantCasters>,
+        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<Vec<RelevantCasters>>,
     ) -> (PreparedShadowMap<'a>, Report) {
         let (mut report, params) = (Report::default(), &self.params);
         let draw = |report: &mut Report| LightMaps::draw(scene, light, params, report, choose);

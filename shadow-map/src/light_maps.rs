@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 use scene_core::geometry::Object;
 use scene_core::light::LightPoint;
 use scene_core::raster::DepthMap;
-use scene_core::relevance::{self, Backdrops, RelevantCasters};
+use scene_core::relevance::{self, Backdrops, CasterRegion, RelevantCasters};
 use scene_core::{GBuffer, Light, Origin, Report, Scene};
 
 use crate::ShadowMapParams;
@@ -81,13 +81,13 @@ pub struct Occluder {
 
 impl<'a> LightMaps<'a> {
     /// `prepare.views` and `prepare.maps`: chooses the views of `light` and draws them. `choose` may narrow the
-    /// casters down to those that matter.
+    /// casters of each view down to those that matter. A face of a cube is drawn from the objects that reach into it.
     pub fn draw(
         scene: &'a Scene,
         light: &Light,
         params: &ShadowMapParams,
         report: &mut Report,
-        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<RelevantCasters>,
+        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<Vec<RelevantCasters>>,
     ) -> Self {
         Self::draw_in(Origin::WORLD, Cow::Borrowed(scene), *light, params, report, choose)
     }
@@ -105,7 +105,7 @@ impl<'a> LightMaps<'a> {
         light: Light,
         params: &ShadowMapParams,
         report: &mut Report,
-        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<RelevantCasters>,
+        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<Vec<RelevantCasters>>,
     ) -> Self {
         let tolerance = plane_tolerance(scene.bounds(), &light);
         let (casters, views) = report.time("prepare.views", |_| {
@@ -115,12 +115,27 @@ impl<'a> LightMaps<'a> {
         });
         report.skip("casters", casters.backdrops.len() as u64);
         report.skip("faces", views.skipped_faces);
-        let ranges: Vec<Range<usize>> = match choose(&casters, &views.views, report) {
-            Some(chosen) => chosen.ranges,
-            None => casters.drawn.iter().map(|object| object.triangles.clone()).collect(),
-        };
-        let maps =
-            report.time("prepare.maps", |_| cpu::render_maps(&scene, &ranges, &views.views, params.map_size));
+        let chosen = choose(&casters, &views.views, report);
+        let maps = report.time("prepare.maps", |report| {
+            let ranges: Vec<Vec<Range<usize>>> = match chosen {
+                Some(chosen) => chosen.into_iter().map(|casters| casters.ranges).collect(),
+                None => {
+                    let reaches_into = |view: &LightView| {
+                        let is_face = params.skip && views.views.len() > 1;
+                        let region = is_face.then(|| CasterRegion::inside(&scene, &view.sides(1.0, 0.0)));
+                        move |object: &&&Object| region.as_ref().is_none_or(|r| r.touches(&object.bounds))
+                    };
+                    let of = |view: &LightView| {
+                        let objects = casters.drawn.iter().filter(reaches_into(view));
+                        objects.map(|object| object.triangles.clone()).collect()
+                    };
+                    views.views.iter().map(of).collect()
+                }
+            };
+            let undrawn = ranges.iter().filter(|ranges| ranges.is_empty()).count();
+            report.skip("faces", if params.skip { undrawn as u64 } else { 0 });
+            cpu::render_maps_of(&scene, &ranges, &views.views, params.map_size)
+        });
         let backdrops = casters.backdrops.into_iter().cloned().collect();
         let maps = Self { origin, scene, light, maps, backdrops, tolerance };
         report.bytes += maps.bytes();

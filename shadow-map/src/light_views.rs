@@ -4,9 +4,10 @@
 //! lit. Casters behind which there is nothing (the ground under everything) are left out of the fit, which is
 //! what makes a small object on a large ground get all the texels.
 
-use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
+use glam::{DVec4, Mat3, Mat4, Vec2, Vec3, Vec4};
 use scene_core::geometry::{Aabb, Object};
 use scene_core::light::LightPoint;
+use scene_core::relevance::HalfSpace;
 use scene_core::{Light, Scene};
 
 /// Tangent of the half angle up to which one perspective view serves. Beyond 60° the middle of the map gets
@@ -99,6 +100,19 @@ impl LightView {
         inside.then(|| Vec2::new(clip.x, clip.y) / clip.w)
     }
 
+    /// The four sides of what the map holds, `times` as wide from its middle, moved outwards by `distance`.
+    pub(crate) fn sides(&self, times: f64, distance: f64) -> Vec<HalfSpace> {
+        let rows = self.projection_from_world.as_dmat4().transpose();
+        // |x| ≤ w and |y| ≤ w.
+        let sides =
+            [rows.x_axis, -rows.x_axis, rows.y_axis, -rows.y_axis].map(|row| row - rows.w_axis * times);
+        let plane = |side: DVec4| {
+            let length = side.truncate().length();
+            HalfSpace { normal: side.truncate() / length, offset: distance - side.w / length }
+        };
+        sides.map(plane).into_iter().filter(|side| side.offset.is_finite()).collect()
+    }
+
     /// The parts of [`unproject`](Self::unproject), for shaders.
     #[cfg(feature = "gpu")]
     pub(crate) fn unprojection(&self) -> Unprojection {
@@ -175,9 +189,7 @@ pub fn light_views(scene: &Scene, light: &Light, casters: &[&Object], skip: bool
         LightPoint::Towards(to_light) => {
             let (x, y) = to_light.any_orthonormal_pair();
             let axes = Mat3::from_cols(x, y, to_light);
-            let light_from_world = axes.transpose();
-            let bounds = Aabb::from_points(points().map(|&p| light_from_world * p));
-            result.views.push(LightView::parallel(axes, bounds));
+            result.views.push(LightView::parallel(axes, bounds_along(scene, axes, casters)));
         }
         LightPoint::At(eye) => {
             let reach = bounds.corners().map(|c| c.distance(eye)).into_iter().fold(0.0, f32::max);
@@ -217,6 +229,23 @@ pub fn light_views(scene: &Scene, light: &Light, casters: &[&Object], skip: bool
         }
     }
     result
+}
+
+/// Bounds of `casters` in the axes of `axes` (columns). Vertices of an object whose box lies within what the others take
+/// are not asked: with 2⁻¹⁶ of the largest coordinate for the rounding of either, bounds are the same without them.
+pub(crate) fn bounds_along(scene: &Scene, axes: Mat3, casters: &[&Object]) -> Aabb {
+    let light_from_world = axes.transpose();
+    casters.iter().fold(Aabb::EMPTY, |bounds, object| {
+        let of_box = Aabb::from_points(object.bounds.corners().map(|corner| light_from_world * corner));
+        let slack = Vec3::splat(object.bounds.magnitude() * MARGIN);
+        let is_within =
+            (of_box.min - slack).cmpge(bounds.min).all() && (of_box.max + slack).cmple(bounds.max).all();
+        if is_within {
+            return bounds;
+        }
+        let vertices = &scene.positions()[object.vertices.clone()];
+        bounds.union(Aabb::from_points(vertices.iter().map(|&p| light_from_world * p)))
+    })
 }
 
 /// The rectangle of tangents around `points` as seen from `eye`; `None` if one of them is not in front.
@@ -318,6 +347,18 @@ mod tests {
         let views = light_views(&scene, &light, &casters, true);
         assert_eq!((views.views.len(), views.skipped_faces), (5, 1));
         assert_eq!(light_views(&scene, &light, &casters, false).views.len(), 6);
+    }
+
+    #[test]
+    fn bounds_are_those_of_every_vertex() {
+        let setup = scene_core::scenes::build("forest:triangles=20000", 0.0).expect("a built-in scene");
+        let casters: Vec<_> = setup.scene.objects().iter().collect();
+        for towards in [Vec3::new(0.3, 1.0, -0.2), Vec3::new(1.0, 0.1, 0.4), Vec3::Y] {
+            let (x, y) = towards.normalize().any_orthonormal_pair();
+            let axes = Mat3::from_cols(x, y, towards.normalize());
+            let all = Aabb::from_points(setup.scene.positions().iter().map(|&p| axes.transpose() * p));
+            assert_eq!(bounds_along(&setup.scene, axes, &casters), all);
+        }
     }
 
     #[test]

@@ -6,6 +6,9 @@
 //!
 //! Maps are drawn and looked up one after another, so memory does not grow with k. `shade` needs the receivers to leave
 //! out what none of them needs, so maps are drawn there, and hold for no longer.
+//!
+//! What is left to err is the texel at a shadow's edge, so each map is fitted to the casters that shadow someone: a slab that
+//! is the ground under everything is not drawn ([`relevance::told_apart_with_solids`]).
 
 use std::borrow::Cow;
 
@@ -92,7 +95,7 @@ impl<'a> MultiView<'a> {
             }
             let tolerance = plane_tolerance(self.scene.bounds(), &light);
             let (casters, views) = report.time("shade.views", |_| {
-                let casters = relevance::told_apart(self.scene, &light, tolerance);
+                let casters = relevance::told_apart_with_solids(self.scene, &light, tolerance);
                 let views = light_views(self.scene, &light, &casters.drawn, self.params.skip);
                 (casters, views)
             });

@@ -6,29 +6,17 @@
 //! triangle as in a map of all casters, and no pixel changes.
 
 use scene_core::light::LightPoint;
-use scene_core::relevance::{CasterRegion, Receivers};
-use scene_core::{Camera, Light, Scene};
+use scene_core::relevance::{CasterRegion, HalfSpace, Receivers};
+use scene_core::{Light, Scene};
 
 use crate::light_views::LightView;
 
-/// The region of those lines for surfaces that `camera` sees, in maps of `map_size` texels a side, where a lookup
-/// reads texels up to `reach` beside the receiver's own.
+/// The region of those lines for `receivers` in maps of `map_size` texels a side, where a lookup reads texels up to `reach`
+/// beside the receiver's own.
 ///
 /// Receivers are grown by 1 + `reach` diagonals of the largest texel at the distance of the farthest receiver: a
 /// texel's centre is half of one away from the place that is looked up at most, and the rasteriser's snapping
 /// ([`scene_core::raster::DEPTH_POSITION_ERROR`]) far less.
-pub fn looked_up(
-    scene: &Scene,
-    light: &Light,
-    camera: &Camera,
-    views: &[LightView],
-    map_size: u32,
-    reach: f64,
-) -> CasterRegion {
-    looked_up_behind(scene, light, &Receivers::seen_by(scene, camera, light), views, map_size, reach)
-}
-
-/// [`looked_up`] for given receivers.
 pub fn looked_up_behind(
     scene: &Scene,
     light: &Light,
@@ -45,4 +33,14 @@ pub fn looked_up_behind(
     let half_diagonal = views.iter().map(|view| view.half_diagonal_at(distance)).fold(0.0, f64::max);
     let texel = half_diagonal * 2.0 / f64::from(map_size.max(1));
     CasterRegion::along(scene, &receivers.grown(texel * (1.0 + reach)), center)
+}
+
+/// The sides of all that is looked up in one face of a cube of `map_size` texels a side, where a lookup reads up to `reach`
+/// texels from its own: the face's, and as many texels of those beside it. `None` where that is more than a quarter of a face.
+///
+/// A direction at 1 + δ from the middle of one face, in units of half a face, is at 1/(1 + δ) in that beside it: so one at
+/// 1 − δ there is at 1/(1 − δ) here. Two texels more are for that of the receiver and for rounding.
+pub fn looked_up_in(view: &LightView, map_size: u32, reach: f64) -> Option<Vec<HalfSpace>> {
+    let beside = 2.0 * (reach + 2.0) / f64::from(map_size.max(1));
+    (beside < 0.5).then(|| view.sides(1.0 / (1.0 - beside), 0.0))
 }

@@ -41,24 +41,23 @@ fn errors_of_multi_view(spec: &str) -> Vec<f64> {
         let (image, _) = shade(scene, light, &gbuffer, params);
         metrics::errors(&image, &truth, &valid).expect("of one size").rmse
     };
-    [(4, 64), (32, 256), (256, 512)].map(error).to_vec()
+    [(4, 64), (32, 256), (256, 1024)].map(error).to_vec()
 }
 
-/// At worst the error falls as the texel: with all points and half the texels a side of what 0.01 is promised for, twice
-/// that (the example has the full sizes).
 #[test]
 fn multi_view_converges_to_ground_truth() {
     for spec in ["quads", "ball", "log-cabin"] {
         let errors = errors_of_multi_view(spec);
         println!("{spec}: {errors:?}");
         assert!(errors[1] < 0.6 * errors[0] && errors[2] < 0.6 * errors[1], "{spec}: {errors:?}");
-        assert!(errors[2] < 0.02, "{spec}: {errors:?}");
+        assert!(errors[2] <= 0.01, "{spec}: {errors:?}");
     }
 }
 
 #[test]
 fn one_view_of_a_point_is_the_hard_map() {
-    let setup = scenes::build("chess", 0.0).expect("a built-in scene");
+    // No slab lies under it, to which only `hard` fits its map.
+    let setup = scenes::build("forest:triangles=20000", 0.0).expect("a built-in scene");
     let light = Light::Point { position: setup.scene.bounds().center() + Vec3::Y * 2.0 };
     let gbuffer = raster::render_gbuffer(&setup.scene, &setup.camera.with_size(128, 128));
     let of =

@@ -2,16 +2,17 @@
 
 mod views;
 
-use gnomon_shadow_map::{ShadowMap, ShadowMapParams};
+use gnomon_shadow_map::{ShadowMap, ShadowMapParams, Variant};
 use scene_core::relevance::CasterChunks;
 use scene_core::{Light, Scene, VisibilityImage, raster, scenes};
 use views::random_view;
 
 /// Images of `count` random views by maps of all casters and by maps of those that the view needs. Returns how
 /// many triangles were left out, of all views together, and how many pixels were in shadow.
-fn compare(scene: &Scene, light: &Light, count: u64) -> (u64, usize) {
-    let technique = ShadowMap::new(ShadowMapParams { map_size: 256, ..Default::default() });
-    let (full, _) = technique.prepare(scene, light);
+fn compare(scene: &Scene, light: &Light, params: ShadowMapParams, count: u64) -> (u64, usize) {
+    let technique = ShadowMap::new(ShadowMapParams { map_size: 256, ..params });
+    let without = ShadowMapParams { map_size: 256, skip: false, ..params };
+    let (full, _) = ShadowMap::new(without).prepare(scene, light);
     let chunks = CasterChunks::new(scene);
     let (mut culled, mut dark) = (0, 0);
     for seed in 0..count {
@@ -24,7 +25,7 @@ fn compare(scene: &Scene, light: &Light, count: u64) -> (u64, usize) {
         part.shade(&gbuffer, &mut images[1]);
         let [full, part] = images.map(|i| i.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
         let wrong = full.iter().zip(&part).filter(|(a, b)| a != b).count();
-        assert_eq!(wrong, 0, "{light:?}, view {seed}: {camera:?}");
+        assert_eq!(wrong, 0, "{:?}, {light:?}, view {seed}: {camera:?}", params.variant);
         dark += full.iter().filter(|&&v| v == 0).count();
     }
     (culled, dark)
@@ -41,8 +42,11 @@ fn compare_scene(spec: &str) {
         inner: 0.3,
     };
     for light in [setup.lights[0], Light::Point { position: inside }, spot] {
-        let (culled, dark) = compare(&setup.scene, &light, 8);
-        assert!(culled > 0 && dark > 0, "{spec}, {light:?}: {culled} left out, {dark} dark pixels");
+        for variant in [Variant::Hard, Variant::Pcf, Variant::ObjectId] {
+            let params = ShadowMapParams { variant, ..Default::default() };
+            let (culled, dark) = compare(&setup.scene, &light, params, 8);
+            assert!(culled > 0 && dark > 0, "{spec}, {light:?}: {culled} left out, {dark} dark pixels");
+        }
     }
 }
 
@@ -59,4 +63,22 @@ fn park() {
 #[test]
 fn forest() {
     compare_scene("forest:triangles=100000");
+}
+
+/// A lamp in the middle of what a narrow camera sees a part of: faces that look elsewhere are not drawn, filters or not.
+#[test]
+fn faces_that_nobody_sees_are_not_drawn() {
+    let setup = scenes::build("forest:triangles=20000", 0.0).expect("a built-in scene");
+    let camera = scene_core::Camera { fov_y: 0.1, ..setup.camera.with_size(64, 64) };
+    let light = Light::Point { position: setup.scene.bounds().center() };
+    let chunks = CasterChunks::new(&setup.scene);
+    for variant in [Variant::Hard, Variant::Pcf, Variant::ObjectId] {
+        let technique = ShadowMap::new(ShadowMapParams { map_size: 256, variant, ..Default::default() });
+        let (maps, report) = technique.prepare_for_view(&setup.scene, &light, &camera, &chunks);
+        let drawn = maps.maps().iter().filter(|map| map.map.depth.iter().any(|&depth| depth > 0.0)).count();
+        assert!(drawn < 6 && drawn as u64 + report.skipped["faces"] <= 6, "{variant:?}: {drawn} {report:?}");
+        let (all, report) = technique.prepare(&setup.scene, &light);
+        let drawn_all = all.maps().iter().filter(|map| map.map.depth.iter().any(|&d| d > 0.0)).count();
+        assert!(drawn_all > drawn, "{variant:?}: {drawn_all} {report:?}");
+    }
 }

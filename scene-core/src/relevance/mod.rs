@@ -6,7 +6,7 @@
 //! | which casters can shadow what is seen? | [`CasterRegion`], [`relevant_casters`] |
 //! | which of them, for one cascade or face of a cube? | [`Receivers::inside`], [`depth_slice`], [`pyramid`] |
 //! | which receivers does the light reach, and a part of its maps? | [`reached_receivers`], [`objects_among`] |
-//! | which casters have nothing behind them? | [`told_apart`] |
+//! | which casters have nothing behind them? | [`told_apart`], [`told_apart_with_solids`] |
 //! | where is what a tile of the image sees? | [`TileBounds`] |
 //! | which tiles need no filter, being lit or in umbra? | [`classify_tiles`] |
 //! | what stays valid from the frame before? | [`what_remains`] |
@@ -24,7 +24,7 @@ mod tiles;
 mod validity;
 mod volumes;
 
-pub use backdrops::{Backdrops, told_apart};
+pub use backdrops::{Backdrops, MOST_OF_A_SOLID, told_apart, told_apart_with_solids};
 pub use casters::{CasterChunks, RelevantCasters, relevant_casters};
 pub use classes::{TileClasses, classify_tiles};
 pub use extent::reach_of;

@@ -7,9 +7,9 @@ use scene_core::{Light, Report, relevance};
 
 use super::filter_maps::LevelTable;
 use super::layout::{MapsUniform, ViewUniform};
-use crate::ShadowMapParams;
 use crate::light_views::{LightView, light_views};
 use crate::receiver_plane::plane_tolerance;
+use crate::{ShadowMapParams, Variant};
 
 /// Draws the maps of a light, and keeps their textures and what shaders must know of them.
 #[derive(Debug)]
@@ -61,7 +61,10 @@ impl LightMapsOnGpu {
     pub fn plan(&self, scene: &GpuScene<'_>, light: &Light, report: &mut Report) -> MapsPlan {
         let geometry = scene.geometry_or_boxes();
         let tolerance = plane_tolerance(geometry.bounds(), light);
-        let casters = relevance::told_apart(&geometry, light, tolerance);
+        // A box in the place of an object may be convex where the object is not.
+        let has_solids = self.params.variant == Variant::MultiView && scene.geometry.is_some();
+        let told_apart = if has_solids { relevance::told_apart_with_solids } else { relevance::told_apart };
+        let casters = told_apart(&geometry, light, tolerance);
         let views = light_views(&geometry, light, &casters.drawn, self.params.skips_faces());
         report.skip("casters", casters.backdrops.len() as u64);
         report.skip("faces", views.skipped_faces);
