@@ -137,7 +137,7 @@ impl<'a> LightMaps<'a> {
                 }
             };
             let undrawn = ranges.iter().filter(|ranges| ranges.is_empty()).count();
-            report.skip("faces", if params.skip { undrawn as u64 } else { 0 });
+            report.skip("undrawn faces", if params.skip { undrawn as u64 } else { 0 });
             if leaves_out_empty {
                 let mut of_views = ranges.iter();
                 views.retain(|_| of_views.next().is_some_and(|ranges| !ranges.is_empty()));
