@@ -1,16 +1,14 @@
-//! Silhouette edges on the screen, where the rasteriser sees them.
+//! Silhouette edges on the screen.
 //!
 //! Counting along the way from the eye to a pixel's surface needs no caps, because no caster lies before the surface
-//! that is seen. That holds of the *snapped* triangles that the G-buffer was drawn from, so on which side of an edge a
-//! pixel lies is asked of the snapped edge, by the rasteriser's rule. Then a pixel a hair beside an outline is never
-//! taken for one that the caster covers, nor the other way round.
+//! that is seen. That holds of the *snapped* triangles that the G-buffer was drawn from, and of the exact ones wherever no
+//! silhouette edge is [`CLOSE`]: pixels that are close to one are traced, and nothing is counted from them.
 //!
 //! # The link of a path around an edge
 //! Let P and Q be seen points and E the eye. The ways E→P and E→Q cross no caps. So the caps that the chord P→Q
 //! crosses are those of the loop E→P→Q→E, and these are, as the chain of all caps is bounded by the silhouette, the
 //! silhouette edges that pass through the triangle E P Q: each ±m. Hence a path between two pixels is counted by
-//! silhouette edges alone, however many triangles lie along it. Only on which side of an edge the ways to P and Q pass is
-//! asked of the snapped edge; the rest is asked of the vertices as they are.
+//! silhouette edges alone, however many triangles lie along it.
 
 use glam::DVec3;
 use scene_core::Camera;
@@ -20,8 +18,7 @@ use crate::crossing::Edge;
 
 /// In steps, how close a centre may be to an edge for its pixel to be traced instead of counted. Snapping moves a vertex
 /// by half a step along x and along y, and a counted place is seen up to [`OFF_CENTER`] beside its pixel's centre: beyond two
-/// steps the exact edge and the snapped one agree. Closer, they agree as one chain does with another, but for what happens
-/// around a vertex or on a needle thinner than a step.
+/// steps the way from the eye passes the exact edge where the centre passes the snapped one.
 pub const CLOSE: f64 = 2.0;
 
 /// In steps, how far beside its pixel's centre a place may be seen, along x and along y. A shadow ray starts off its surface and
@@ -39,6 +36,8 @@ pub struct ScreenEdge {
     max: [f64; 2],
     /// The edge's line as a function of x and y in steps: factors, constant, and what rounding may do to it.
     line: [f64; 4],
+    /// Normal of the plane through the eye and the edge.
+    normal: DVec3,
     /// Depth of the nearer end, along the view direction; negative infinity behind the eye.
     pub depth: f64,
 }
@@ -101,6 +100,7 @@ impl Screen {
     pub fn project(&self, edge: &Edge) -> ScreenEdge {
         let depths = [edge.a, edge.b].map(|p| self.depth(p - self.eye));
         let depth = depths[0].min(depths[1]);
+        let normal = (edge.a - self.eye).cross(edge.b - self.eye);
         let snapped = [edge.a, edge.b].map(|p| self.view.snap(p.as_vec3()));
         match snapped {
             // Before the near plane nothing is drawn, and caps are counted as they are, not as they are snapped.
@@ -109,19 +109,25 @@ impl Screen {
                 let fold = |pick: fn(f64, f64) -> f64| [pick(a[0], b[0]), pick(a[1], b[1])];
                 let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
                 let line = [-dy, dx, dy * a[0] - dx * a[1], 0.0];
-                ScreenEdge { ends: Some([a, b]), min: fold(f64::min), max: fold(f64::max), line, depth }
+                ScreenEdge {
+                    ends: Some([a, b]),
+                    min: fold(f64::min),
+                    max: fold(f64::max),
+                    line,
+                    normal,
+                    depth,
+                }
             }
             _ => {
                 // All of it behind the eye: it passes no triangle that begins there.
                 let is_behind = depths[0].max(depths[1]) <= 0.0;
                 let all = if is_behind { f64::NAN } else { f64::INFINITY };
                 let [corner, right, down] = self.rays;
-                let normal = (edge.a - self.eye).cross(edge.b - self.eye);
                 let (x, y) = (normal.dot(right), normal.dot(down));
                 // The function is asked of positions, which f32 rounds, and of lifted ones: both are within a pixel.
                 let slack = (x.abs() + y.abs()) * f64::from(SnappedView::STEPS);
                 let line = [x, y, normal.dot(corner), slack];
-                ScreenEdge { ends: None, min: [-all; 2], max: [all; 2], line, depth }
+                ScreenEdge { ends: None, min: [-all; 2], max: [all; 2], line, normal, depth }
             }
         }
     }
@@ -132,6 +138,12 @@ impl ScreenEdge {
     #[inline(always)]
     pub fn ends(&self) -> Option<[[f64; 2]; 2]> {
         self.ends
+    }
+
+    /// From where to where the edge may pass, in steps along x or y, and as close as [`CLOSE`] to it.
+    #[inline(always)]
+    pub(crate) fn range(&self, axis: usize) -> [f64; 2] {
+        [self.min[axis] - CLOSE, self.max[axis] + CLOSE]
     }
 
     /// Whether a centre is as close as [`CLOSE`] to the edge's line.
@@ -160,46 +172,28 @@ impl ScreenEdge {
             && self.depth <= depth + depth.abs() * f64::from(f32::EPSILON)
     }
 
-    /// Whether a seen point lies right of the edge, as seen from the eye.
+    /// Whether a seen point, given from the eye, lies right of the edge as seen from there.
     #[inline(always)]
-    pub fn is_right(&self, edge: &Edge, eye: DVec3, point: &SeenPoint) -> bool {
-        match self.ends {
-            Some([a, b]) => right_of(a, b, point.center),
-            None => (edge.a - eye).cross(edge.b - eye).dot(point.from_eye) >= 0.0,
-        }
+    pub fn is_right(&self, from_eye: DVec3) -> bool {
+        self.normal.dot(from_eye) >= 0.0
     }
 
-    /// The link of the loop eye → `from` → `to` → eye with this edge, for multiplicity 1. `beyond_edge` is the sign of
-    /// μ of the chord from `from` to `to`: see [`crate::crossing`].
+    /// The normal of the plane through the eye and the edge: positive products lie right of it.
     #[inline(always)]
-    pub fn link(&self, edge: &Edge, eye: DVec3, from: &SeenPoint, to: &SeenPoint, beyond_edge: bool) -> i32 {
-        let from_right = self.is_right(edge, eye, from);
-        if from_right == self.is_right(edge, eye, to) || beyond_edge != from_right {
+    pub(crate) fn normal(&self) -> DVec3 {
+        self.normal
+    }
+
+    /// The link of the loop eye → `from` → `to` → eye with this edge, for multiplicity 1; both points are given from the
+    /// eye. `beyond_edge` is the sign of μ of the chord from `from` to `to`: see [`crate::crossing`].
+    #[inline(always)]
+    pub fn link(&self, edge: &Edge, eye: DVec3, from: DVec3, to: DVec3, beyond_edge: bool) -> i32 {
+        let from_right = self.is_right(from);
+        if from_right == self.is_right(to) || beyond_edge != from_right {
             return 0;
         }
-        // Not of the snapped vertices: which side of one the chord passes must agree with where it passes the light's ray
-        // through it, and a chord may pass as close to a vertex as it likes.
-        let right = |v: DVec3| (v - eye).cross(from.from_eye).dot(to.from_eye) >= 0.0;
+        let right = |v: DVec3| (v - eye).cross(from).dot(to) >= 0.0;
         let (a_right, b_right) = (right(edge.a), right(edge.b));
         i32::from(a_right) - i32::from(b_right)
     }
-}
-
-/// Twice the area of (a, b, p), positive if p is right of the line as seen. Exact: steps have 24 bits.
-#[inline(always)]
-fn cross(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
-    (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
-}
-
-/// [`SnappedView::owns`].
-#[inline(always)]
-pub(crate) fn owns(a: [f64; 2], b: [f64; 2]) -> bool {
-    b[1] < a[1] || (b[1] == a[1] && b[0] > a[0])
-}
-
-/// Whether a pixel's centre lies right of the line from a to b by the top-left rule.
-#[inline(always)]
-fn right_of(a: [f64; 2], b: [f64; 2], center: [f64; 2]) -> bool {
-    let value = cross(a, b, center);
-    value > 0.0 || (value == 0.0 && owns(a, b))
 }

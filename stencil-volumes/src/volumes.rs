@@ -215,8 +215,8 @@ impl Volumes {
                 let outside = edge.is_outside(plane, start.place);
                 if from_eye {
                     if outside != eye_outside {
-                        let beyond = outline.is_right(edge, eye, &start.seen);
-                        let crossed = crossing(&side, start.seen.from_eye, beyond, eye_outside, outside);
+                        let beyond = outline.is_right(start.from_eye);
+                        let crossed = crossing(&side, start.from_eye, beyond, eye_outside, outside);
                         *sum += edge.multiplicity * crossed;
                     }
                 } else {
@@ -271,22 +271,22 @@ const EDGES_A_TASK: usize = 1024;
 pub struct Start {
     /// Its place.
     pub place: DVec3,
-    /// How it is seen.
-    pub seen: crate::outline::SeenPoint,
+    /// The same, seen from the eye.
+    pub from_eye: DVec3,
     /// The way on from it to infinity: along the view, if that is not the way light travels.
     pub onward: DVec3,
 }
 
 impl Start {
-    /// A start at `place`, seen at `seen`.
-    pub fn new(place: DVec3, seen: crate::outline::SeenPoint, light: &HomogeneousLight) -> Self {
-        let mut onward = seen.from_eye;
+    /// A start at `place`, which lies at `from_eye` from the eye.
+    pub fn new(place: DVec3, from_eye: DVec3, light: &HomogeneousLight) -> Self {
+        let mut onward = from_eye;
         // Straight away from a light at infinity all is seen edge-on; any other direction will do.
         let across = onward.cross(light.point).length();
         if light.at_infinity && across <= 1e-3 * onward.length() * light.point.length() {
             onward = light.point.any_orthonormal_vector() + 0.5 * light.point.normalize_or_zero();
         }
-        Self { place, seen, onward }
+        Self { place, from_eye, onward }
     }
 }
 

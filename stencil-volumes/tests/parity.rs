@@ -8,7 +8,7 @@
 
 mod truth;
 
-use glam::{Affine3A, Vec2, Vec3};
+use glam::{Affine3A, Vec3};
 use gnomon_stencil_volumes::near_casters;
 use gnomon_stencil_volumes::{Casters, Count, StencilVolumes, StencilVolumesOnGpu, Variant, VolumeParams};
 use scene_core::bvh::Bvh;
@@ -17,7 +17,7 @@ use scene_core::gpu::headless::VISIBILITY_FORMAT;
 use scene_core::gpu::{Gpu, testing};
 use scene_core::reference::valid_pixels;
 use scene_core::{Camera, GBuffer, Light, Scene, TriangleMesh, VisibilityImage, raster, scenes};
-use truth::{Comparison, compare, trace};
+use truth::{Comparison, as_textures_hold_it, compare, trace};
 
 fn on_gpu(
     gpu: &Gpu,
@@ -35,17 +35,6 @@ fn on_gpu(
     let counters: Vec<u32> = gpu.read_buffer(&volumes.counters(&gpu.device).unwrap()).unwrap();
     let pixels: Vec<u32> = gpu.read_buffer(&volumes.pixels(&gpu.device).unwrap()).unwrap();
     (run.visibility, [counters[0], counters[1], counters[2], pixels[0]])
-}
-
-/// Positions as shaders find them.
-fn as_textures_hold_it(gbuffer: &GBuffer, camera: &Camera) -> GBuffer {
-    let mut rounded = gbuffer.clone();
-    for pixel in (0..gbuffer.pixel_count()).filter(|&pixel| gbuffer.is_seen(pixel)) {
-        let (x, y) = (pixel as u32 % gbuffer.width, pixel as u32 / gbuffer.width);
-        let ray = camera.ray_direction(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
-        rounded.position[pixel] = camera.eye + ray * gbuffer.depth[pixel];
-    }
-    rounded
 }
 
 fn check(gpu: &Gpu, name: &str, scene: &Scene, camera: &Camera, light: &Light) -> Comparison {

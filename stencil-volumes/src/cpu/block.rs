@@ -57,6 +57,8 @@ pub(super) struct Block {
     pub(super) start_count: i32,
     /// Per row, a bit a pixel: lit.
     pub(super) lit: [u64; BLOCK],
+    /// The silhouette edges that pass before the block, and a bit for each tile that they pass before.
+    passing: Vec<(u32, u64)>,
     /// What was done.
     pub(super) work: Work,
     /// The rectangle of centres of the block.
@@ -65,8 +67,14 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// Looks at the pixels from `corner` on.
-    pub(super) fn new(volumes: &Volumes, receivers: &Receivers<'_>, corner: [usize; 2]) -> Self {
+    /// Looks at the pixels from `corner` on, and at the silhouette's edges before them.
+    #[inline(always)]
+    pub(super) fn new<S: Simd>(
+        simd: S,
+        volumes: &Volumes,
+        receivers: &Receivers<'_>,
+        corner: [usize; 2],
+    ) -> Self {
         let center = |x: usize, y: usize| SnappedView::center(x as u32, y as u32).map(f64::from);
         let last = [corner[0] + BLOCK - 1, corner[1] + BLOCK - 1];
         let mut block = Self {
@@ -75,6 +83,7 @@ impl Block {
             start: None,
             start_count: 0,
             lit: [0; BLOCK],
+            passing: Vec::new(),
             work: Work::default(),
             min: center(corner[0], corner[1]),
             max: center(last[0], last[1]),
@@ -85,8 +94,66 @@ impl Block {
             block.tiles[index].corner = center(corner[0] + at[0], corner[1] + at[1]);
             block.look(index, volumes, receivers, corner, at);
         }
+        let sides = block.find_passing(simd, volumes);
+        let eye = LightPoint::At(volumes.screen.eye.as_vec3());
+        // The rasteriser compares depths of snapped triangles: where surfaces cross, and on those seen edge-on, the place it
+        // finds may lie behind another. From there nothing can be counted.
+        let is_before_all = |place: DVec3| !volumes.tree.is_occluded(place.as_vec3(), eye);
+        for (index, sides) in sides.into_iter().enumerate() {
+            let is_dense = sides > volumes.dense || volumes.dense == 0;
+            if is_dense || !block.tiles[index].choose_start(is_before_all) {
+                block.trace(index, volumes, receivers.light.center());
+            }
+        }
         block.hang(volumes);
         block
+    }
+
+    /// Finds the edges that pass before the block and marks the pixels that are close to one. How many pass before each tile.
+    #[inline(always)]
+    fn find_passing<S: Simd>(&mut self, simd: S, volumes: &Volumes) -> [u32; TILES] {
+        let mut counted = [0; TILES];
+        let side = (TILE * SnappedView::STEPS as usize) as f64;
+        let reach = ((TILE - 1) * SnappedView::STEPS as usize) as f64;
+        let depth = self.tiles.iter().map(|tile| tile.depth).fold(f64::NEG_INFINITY, f64::max);
+        for (edge, outline) in (0_u32..).zip(&volumes.outlines) {
+            if !outline.may_pass(self.min, self.max, depth) {
+                continue;
+            }
+            let mut passed = 0;
+            // A float becomes the nearest integer there is: rows and columns from the first to the last.
+            let [columns, rows] = [0, 1].map(|axis| {
+                let [low, high] = outline.range(axis).map(|x| (x - self.min[axis]) / side);
+                ((low - 1.0).max(0.0) as usize)..(high.max(-1.0) + 1.0).min(BLOCK_TILES as f64) as usize
+            });
+            for index in rows.flat_map(|row| columns.clone().map(move |column| row * BLOCK_TILES + column)) {
+                let tile = &mut self.tiles[index];
+                let high = [tile.corner[0] + reach, tile.corner[1] + reach];
+                if tile.len > 0 && outline.may_pass(tile.corner, high, tile.depth) {
+                    passed |= 1 << index;
+                    counted[index] += 1;
+                    if counted[index] <= volumes.dense {
+                        tile.mark_close(simd, outline);
+                    }
+                }
+            }
+            self.passing.push((edge, passed));
+        }
+        counted
+    }
+
+    /// Traces all asked pixels of a tile, and forgets them.
+    fn trace(&mut self, index: usize, volumes: &Volumes, light: LightPoint) {
+        let at = [index % BLOCK_TILES * TILE, index / BLOCK_TILES * TILE];
+        let tile = &mut self.tiles[index];
+        for i in 0..tile.len {
+            // The place is an f32 that was widened.
+            let lit = !volumes.tree.is_occluded(tile.place(i).as_vec3(), light);
+            let pixel = tile.pixel[i] as usize;
+            self.lit[at[1] + pixel / TILE] |= u64::from(lit) << (at[0] + pixel % TILE);
+        }
+        self.work.traced += tile.len as u64;
+        tile.len = 0;
     }
 
     /// Packs the asked pixels of a tile.
@@ -149,7 +216,6 @@ impl Block {
                 }
             }
         }
-        tile.start = tile.len / 2;
         self.work.tiles += u64::from(tile.len > 0);
         self.work.asked += tile.len as u64;
     }
@@ -175,8 +241,8 @@ impl Block {
                 .or(before);
             if parent.is_none() {
                 let tile = &self.tiles[index];
-                let seen = tile.seen(tile.start, eye);
-                self.start = Some(Start::new(tile.place(tile.start), seen, &volumes.light));
+                let place = tile.place(tile.start);
+                self.start = Some(Start::new(place, place - eye, &volumes.light));
             }
             self.links[index].parent = parent.unwrap_or(index);
             before = Some(index);
@@ -190,10 +256,8 @@ impl Block {
             return;
         }
         let mut sides = [0_u32; TILES];
-        if volumes.dense > 0 {
-            self.count_sides(simd, volumes, &mut sides);
-            self.count_links(simd, volumes, &mut sides);
-        }
+        self.count_links(simd, volumes, &mut sides);
+        self.count_sides(simd, volumes, &mut sides);
         let mut starts = [0; TILES];
         for index in 0..TILES {
             let tile = &self.tiles[index];
@@ -203,7 +267,7 @@ impl Block {
             let Link { parent, change } = self.links[index];
             starts[index] = if parent == index { self.start_count } else { starts[parent] + change };
             let at = [index % BLOCK_TILES * TILE, index / BLOCK_TILES * TILE];
-            let is_dense = volumes.dense == 0 || sides[index] > volumes.dense;
+            let is_dense = sides[index] > volumes.dense;
             self.work.uniform += u64::from(sides[index] == 0 && !is_dense);
             for i in 0..tile.len {
                 let lit = if is_dense || tile.close >> i & 1 == 1 {
@@ -296,39 +360,31 @@ impl Block {
     #[inline(always)]
     fn count_links<S: Simd>(&mut self, simd: S, volumes: &Volumes, counted: &mut [u32; TILES]) {
         let eye = volumes.screen.eye;
-        let step = f64::from(SnappedView::STEPS);
-        let reach = (TILE - 1) as f64 * step;
-        let depth = self.tiles.iter().map(|tile| tile.depth).fold(f64::NEG_INFINITY, f64::max);
-        for (outline, edge) in volumes.outlines.iter().zip(&volumes.edges) {
-            if !outline.may_pass(self.min, self.max, depth) {
-                continue;
-            }
-            for (index, counted) in counted.iter_mut().enumerate() {
-                let tile = &self.tiles[index];
-                if tile.len == 0 {
+        for (edge, mut passed) in std::mem::take(&mut self.passing) {
+            let (edge, outline) = (&volumes.edges[edge as usize], &volumes.outlines[edge as usize]);
+            for (index, tile) in self.tiles.iter().enumerate() {
+                let parent = self.links[index].parent;
+                if tile.len == 0 || parent == index {
                     continue;
                 }
-                let (min, max) = (tile.corner, [tile.corner[0] + reach, tile.corner[1] + reach]);
-                let own_depth = tile.depth;
-                let parent = self.links[index].parent;
-                if parent != index {
-                    let from = self.tiles[parent].seen(self.tiles[parent].start, eye);
-                    let to = tile.seen(tile.start, eye);
-                    let least = [from.center[0].min(to.center[0]), from.center[1].min(to.center[1])];
-                    let greatest = [from.center[0].max(to.center[0]), from.center[1].max(to.center[1])];
-                    if outline.may_pass(least, greatest, own_depth.max(self.tiles[parent].depth)) {
-                        let (begin, end) = self.chord(index);
-                        let beyond = (edge.a - begin).cross(edge.b - begin).dot(end - begin) >= 0.0;
-                        self.links[index].change +=
-                            edge.multiplicity * outline.link(edge, eye, &from, &to, beyond);
-                    }
+                let above = &self.tiles[parent];
+                let (from, to) = (above.center(above.start), tile.center(tile.start));
+                let least = [from[0].min(to[0]), from[1].min(to[1])];
+                let greatest = [from[0].max(to[0]), from[1].max(to[1])];
+                if outline.may_pass(least, greatest, tile.depth.max(above.depth)) {
+                    let (from, to) = self.chord(index);
+                    let beyond = (edge.a - from).cross(edge.b - from).dot(to - from) >= 0.0;
+                    let link = outline.link(edge, eye, from - eye, to - eye, beyond);
+                    self.links[index].change += edge.multiplicity * link;
                 }
-                if outline.may_pass(min, max, own_depth) {
-                    *counted += 1;
-                    if *counted <= volumes.dense {
-                        self.tiles[index].add_link(simd, edge, outline, eye);
-                        self.work.pairs += 1;
-                    }
+            }
+            while passed != 0 {
+                let index = passed.trailing_zeros() as usize;
+                passed &= passed - 1;
+                if self.tiles[index].len > 0 {
+                    counted[index] += 1;
+                    self.tiles[index].add_link(simd, edge, outline, eye);
+                    self.work.pairs += 1;
                 }
             }
         }

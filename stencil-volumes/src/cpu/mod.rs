@@ -6,12 +6,12 @@
 //! pixel of each, and the first tile of a block is counted from the eye or from infinity ([`crate::volumes`]). So work
 //! grows with the number of silhouette edges and the length of the shadows' outlines, not with the area of the sides.
 //!
-//! Casters with cut-out masks are not counted ([`crate::masked`]). A few pixels are not counted but traced: those in tiles of very many sides, where rays cost less; those closer than
-//! 1/128 pixel to a silhouette edge; those behind a caster that the near plane cut; those whose ray starts at a place that is
-//! seen beside the pixel's centre ([`crate::outline::OFF_CENTER`]); and those whose position lies beside the triangle it was
-//! found on. The rasteriser may take a triangle for seen up to 2⁻⁹ pixel beside
-//! it; the position, on its plane, is then on no surface, perhaps behind a neighbour's, and what lies between the eye and
-//! it is not known.
+//! Casters with cut-out masks are not counted ([`crate::masked`]). A few pixels are not counted but traced: those in tiles of
+//! very many sides, where rays cost less; those closer than 1/128 pixel to a silhouette edge; those behind a caster that the near
+//! plane cut; those whose ray starts at a place that is seen beside the pixel's centre ([`crate::outline::OFF_CENTER`]); and those
+//! whose position lies beside the triangle it was found on. The rasteriser may take a triangle for seen up to 2⁻⁹ pixel beside it;
+//! the position, on its plane, is then on no surface, perhaps behind a neighbour's, and what lies between the eye and it is not
+//! known. That a tile's start lies behind nothing is asked of a ray to the eye: all its pixels hang on it.
 //!
 //! After Aila and Akenine-Möller, *A hierarchical shadow volume algorithm* (2004), which tests a tile's whole depth range
 //! and counts non-boundary tiles at one pixel each by rasterising all sides there.
@@ -120,7 +120,7 @@ pub fn shade(
         blocks
             .map(|index| {
                 let corner = [index % columns * BLOCK, index / columns * BLOCK];
-                Block::new(volumes, receivers, corner)
+                dispatch!(level, simd => Block::new(simd, volumes, receivers, corner))
             })
             .collect()
     });

@@ -6,10 +6,13 @@ use glam::DVec3;
 use super::TILE;
 use crate::bounds::LANES;
 use crate::crossing::{Edge, HomogeneousLight, SideFromApex};
-use crate::outline::{CLOSE, ScreenEdge, SeenPoint};
+use crate::outline::{CLOSE, ScreenEdge};
 
 /// Pixels of a tile.
 pub(super) const PIXELS: usize = TILE * TILE;
+
+/// Pixels that are tried as starts: one ray each.
+const TRIES: usize = 4;
 
 /// The asked pixels of a tile, packed to the front.
 #[derive(Clone, Debug)]
@@ -66,13 +69,21 @@ impl Tile {
         self.len += 1;
     }
 
-    /// An asked pixel as seen from the eye.
-    #[inline(always)]
-    pub(super) fn seen(&self, index: usize, eye: DVec3) -> SeenPoint {
-        SeenPoint {
-            center: [self.center[0][index], self.center[1][index]],
-            from_eye: self.place(index) - eye,
-        }
+    /// The centre of an asked pixel in steps.
+    pub(super) fn center(&self, index: usize) -> [f64; 2] {
+        [self.center[0][index], self.center[1][index]]
+    }
+
+    /// Chooses the pixel that stands for the tile: the middlemost of those that are close to no edge and whose place serves. Whether
+    /// there is one among the first [`TRIES`].
+    pub(super) fn choose_start(&mut self, serves: impl Fn(DVec3) -> bool) -> bool {
+        let middle = self.len / 2;
+        let outwards =
+            std::iter::once(middle).chain((1..=self.len).flat_map(|d| [middle.wrapping_sub(d), middle + d]));
+        let apart = outwards.filter(|&i| i < self.len && self.close >> i & 1 == 0);
+        let start = apart.take(TRIES).find(|&i| serves(self.place(i)));
+        self.start = start.unwrap_or_default();
+        start.is_some()
     }
 
     /// Eight values of an array.
@@ -122,48 +133,50 @@ impl Tile {
         }
     }
 
-    /// Adds what the loops over the start and every pixel link of an edge on the screen: [`ScreenEdge::link`] for each.
+    /// Marks the pixels that are close to an edge on the screen.
     #[inline(always)]
-    pub(super) fn add_link<S: Simd>(&mut self, simd: S, edge: &Edge, outline: &ScreenEdge, eye: DVec3) {
-        let apex = self.place(self.start);
-        let towards = (edge.a - apex).cross(edge.b - apex);
-        let from = self.seen(self.start, eye);
+    pub(super) fn mark_close<S: Simd>(&mut self, simd: S, outline: &ScreenEdge) {
         let Some([a, b]) = outline.ends() else {
             for i in 0..self.len {
-                let to = self.seen(i, eye);
-                let beyond = towards.dot(self.place(i) - apex) >= 0.0;
                 // The rasteriser has clipped the edge and snapped what was left.
-                let close = outline.is_close([self.center[0][i], self.center[1][i]]);
-                self.close |= u64::from(close) << i;
-                self.counts[i] += f64::from(edge.multiplicity * outline.link(edge, eye, &from, &to, beyond));
+                self.close |= u64::from(outline.is_close(self.center(i))) << i;
             }
             return;
         };
-        let from_right = outline.is_right(edge, eye, &from);
-        let owned = crate::outline::owns(a, b);
-        let past = |v: DVec3| (v - eye).cross(from.from_eye);
-        let (past_a, past_b) = (past(edge.a), past(edge.b));
+        let reach = ((b[0] - a[0]).abs() + (b[1] - a[1]).abs()).max(1.0) * CLOSE;
         for at in (0..self.len).step_by(LANES) {
             let (x, y) = (Self::load(simd, &self.center[0], at), Self::load(simd, &self.center[1], at));
             // Integers below 2⁵³: exact in any order.
             let value = (y - a[1]) * (b[0] - a[0]) - (x - a[0]) * (b[1] - a[1]);
-            let reach = ((b[0] - a[0]).abs() + (b[1] - a[1]).abs()).max(1.0) * CLOSE;
             let near = value.abs().simd_le(reach)
                 & x.simd_ge(a[0].min(b[0]) - CLOSE)
                 & x.simd_le(a[0].max(b[0]) + CLOSE)
                 & y.simd_ge(a[1].min(b[1]) - CLOSE)
                 & y.simd_le(a[1].max(b[1]) + CLOSE);
             self.close |= near.to_bitmask() << at;
-            let right = if owned { value.simd_ge(0.0) } else { value.simd_gt(0.0) };
-            let other = if from_right { !right } else { right };
-            if !other.any_true() {
-                continue;
-            }
+        }
+    }
+
+    /// Adds what the loops over the start and every pixel link of an edge on the screen: [`ScreenEdge::link`] for each.
+    #[inline(always)]
+    pub(super) fn add_link<S: Simd>(&mut self, simd: S, edge: &Edge, outline: &ScreenEdge, eye: DVec3) {
+        let apex = self.place(self.start);
+        let from_eye = apex - eye;
+        let towards = (edge.a - apex).cross(edge.b - apex);
+        let from_right = outline.is_right(from_eye);
+        let past = |v: DVec3| (v - eye).cross(from_eye);
+        let (past_a, past_b) = (past(edge.a), past(edge.b));
+        for at in (0..self.len).step_by(LANES) {
             let place = [
                 Self::load(simd, &self.place[0], at),
                 Self::load(simd, &self.place[1], at),
                 Self::load(simd, &self.place[2], at),
             ];
+            let right = dot_from(simd, outline.normal(), place, eye).simd_ge(0.0);
+            let other = if from_right { !right } else { right };
+            if !other.any_true() {
+                continue;
+            }
             let beyond = dot_from(simd, towards, place, apex).simd_ge(0.0);
             let passes = other & if from_right { beyond } else { !beyond };
             let a_right = dot_from(simd, past_a, place, eye).simd_ge(0.0);

@@ -51,6 +51,17 @@ pub(crate) fn trace(scene: &Scene, bvh: &Bvh, light: &Light, gbuffer: &GBuffer) 
     values
 }
 
+/// The G-buffer with positions as shaders find them: from a distance in f32, along the ray of the pixel.
+pub(crate) fn as_textures_hold_it(gbuffer: &GBuffer, camera: &Camera) -> GBuffer {
+    let mut rounded = gbuffer.clone();
+    for pixel in (0..gbuffer.pixel_count()).filter(|&pixel| gbuffer.is_seen(pixel)) {
+        let (x, y) = (pixel as u32 % gbuffer.width, pixel as u32 / gbuffer.width);
+        let ray = camera.ray_direction(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
+        rounded.position[pixel] = camera.eye + ray * gbuffer.depth[pixel];
+    }
+    rounded
+}
+
 /// Holds V against the rays'. A pixel that differs is at a border if rays from the same surface, seen 1e-3 pixel beside
 /// its centre in one of sixteen directions, do not all agree.
 pub(crate) fn compare(
