@@ -7,7 +7,7 @@
 //! > n(s) = n(c) + Σ m(e)·o·([s left of e] − [c left of e]),
 //!
 //! where o = −1 if (u, v, w) is right-handed and +1 otherwise: seen from p, along w, a turn from u to v is clockwise in a
-//! right-handed frame, so left as p sees it ([`silhouettes`](crate::silhouettes)) is right in (a, b). V is the share of the
+//! right-handed frame, so left as p sees it ([`silhouettes`](mod@crate::silhouettes)) is right in (a, b). V is the share of the
 //! light's points with n(s) = 0.
 //!
 //! The segment crosses the edge (A, B) if A and B lie on different sides of the line through c and s, and c and s on

@@ -7,7 +7,7 @@
 //! > n(p) = n(t) + Σ m(e)·([p left of e] − [t left of e])
 //!
 //! over the outlines e that the segment from the centre t to p crosses in the image, above the receiver's plane, with m(e)
-//! as the light's centre sees it (the derivation is that of [`silhouettes`](crate::silhouettes), with the centre in the
+//! as the light's centre sees it (the derivation is that of [`silhouettes`](mod@crate::silhouettes), with the centre in the
 //! receiver's place). Coverage of t was decided on snapped places, so outlines are snapped, too, and a centre on an
 //! outline belongs to the side that the top-left rule gives it to. An outline lies in one square of four centres, and so
 //! does the segment: each receiver asks those of one square.
