@@ -19,11 +19,10 @@ pub mod shaders;
 use gnomon_shadow_map::gpu::layout::ViewUniform;
 use scene_core::gpu::{
     GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings,
-    SceneGroups, VisibilityPass, VisibilityPassParts, binding,
+    SceneGroups, VisibilityPass, VisibilityPassParts, binding, storage_buffer,
 };
 use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Report};
-use wgpu::util::DeviceExt as _;
 
 use crate::params::Variant;
 use crate::{Ddoc, DdocParams, cpu};
@@ -141,8 +140,8 @@ impl DdocOnGpu {
             let tables = Tables::new(&prepared, &splats);
             let views: Vec<_> =
                 prepared.layers.iter().map(|layers| ViewUniform::new(&layers.image.view)).collect();
-            let lists = storage(device, "lists over tiles", bytemuck::cast_slice(&tables.words))?;
-            let edges = storage(device, "edges", bytemuck::cast_slice(&tables.edges))?;
+            let lists = storage_buffer(device, "lists over tiles", bytemuck::cast_slice(&tables.words))?;
+            let edges = storage_buffer(device, "edges", bytemuck::cast_slice(&tables.edges))?;
             let bytes = lists.size() + edges.size();
             let uniform = self.uniform.get(device, bytemuck::bytes_of(&tables.uniform));
             let views = self.views.get(device, bytemuck::cast_slice(&views));
@@ -173,19 +172,4 @@ impl DdocOnGpu {
         self.pass.record(recorder, "shade.penumbra", &prepared.own, &prepared.scene, &receivers, visibility);
         Ok(Report { bytes: prepared.bytes, ..Default::default() })
     }
-}
-
-/// A buffer that shaders read; 16 bytes of zeros for none, since a binding must not be empty.
-fn storage(device: &wgpu::Device, what: &'static str, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
-    let limits = device.limits();
-    let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    if bytes.len() as u64 > limit {
-        return Err(GpuError::TooLarge { what, bytes: bytes.len() as u64, limit });
-    }
-    let contents = if bytes.is_empty() { &[0; 16] } else { bytes };
-    Ok(device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some(what),
-        contents,
-        usage: wgpu::BufferUsages::STORAGE,
-    }))
 }

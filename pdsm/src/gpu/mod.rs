@@ -9,11 +9,10 @@ pub mod shaders;
 
 use scene_core::gpu::{
     GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings,
-    SceneGroups, VisibilityPass, VisibilityPassParts, binding,
+    SceneGroups, VisibilityPass, VisibilityPassParts, binding, storage_buffer,
 };
 use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Report};
-use wgpu::util::DeviceExt as _;
 
 use crate::baked::{self, Baked};
 use crate::{Pdsm, PdsmParams, PreparedPdsm};
@@ -130,9 +129,9 @@ impl PdsmOnGpu {
             nodes.extend_from_slice(window.functions.nodes().words());
             offsets.extend_from_slice(&window.layout.offsets);
         }
-        let index = storage(device, "index of functions", bytemuck::cast_slice(&index))?;
-        let nodes = storage(device, "nodes of functions", bytemuck::cast_slice(&nodes))?;
-        let offsets = storage(device, "samples of the light", bytemuck::cast_slice(&offsets))?;
+        let index = storage_buffer(device, "index of functions", bytemuck::cast_slice(&index))?;
+        let nodes = storage_buffer(device, "nodes of functions", bytemuck::cast_slice(&nodes))?;
+        let offsets = storage_buffer(device, "samples of the light", bytemuck::cast_slice(&offsets))?;
         let bytes = index.size() + nodes.size() + offsets.size();
         let uniform = self.uniform.get(device, bytemuck::bytes_of(&uniform));
         let bound = [uniform.into(), index.into(), nodes.into(), offsets.into()];
@@ -159,19 +158,4 @@ impl PdsmOnGpu {
         self.lookup.record(recorder, "shade.lookup", &prepared.own, &prepared.scene, &receivers, visibility);
         Ok(Report { bytes: prepared.bytes, ..Default::default() })
     }
-}
-
-/// A buffer that shaders read; 16 bytes of zeros for none, since a binding must not be empty.
-fn storage(device: &wgpu::Device, what: &'static str, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
-    let limits = device.limits();
-    let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    if bytes.len() as u64 > limit {
-        return Err(GpuError::TooLarge { what, bytes: bytes.len() as u64, limit });
-    }
-    let contents = if bytes.is_empty() { &[0; 16] } else { bytes };
-    Ok(device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some(what),
-        contents,
-        usage: wgpu::BufferUsages::STORAGE,
-    }))
 }

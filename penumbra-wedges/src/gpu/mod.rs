@@ -33,7 +33,7 @@ pub mod tables;
 
 use scene_core::gpu::{
     Bound, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings,
-    SceneGroups, WorkBuffer, binding,
+    SceneGroups, WorkBuffer, binding, binding_limit,
 };
 use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Report};
@@ -177,8 +177,7 @@ impl PenumbraWedgesOnGpu {
 
     fn uniform(&self, tables: &Tables, query: &GpuShadowQuery<'_>, device: &wgpu::Device) -> WedgesUniform {
         let camera = query.camera;
-        let limits = device.limits();
-        let limit = self.list_bytes.min(limits.max_storage_buffer_binding_size).min(limits.max_buffer_size);
+        let limit = self.list_bytes.min(binding_limit(device));
         let [columns, rows] = tiles(camera, BLOCK);
         let room = limit / (4 * u64::from(columns) * u64::from(rows)).max(1);
         let magnitude = query.scene.bounds.magnitude();

@@ -1,8 +1,7 @@
 //! What lives on the device as long as the scene does: edges with their faces, what each triangle is, the casters' trees.
 
 use scene_core::Scene;
-use scene_core::gpu::{CasterTrees, GpuError, GpuScene};
-use wgpu::util::DeviceExt as _;
+use scene_core::gpu::{CasterTrees, GpuError, GpuScene, storage_buffer};
 
 use crate::casters::{Casters, has_edges};
 use crate::edges::is_flat;
@@ -71,19 +70,7 @@ impl Tables {
         for triangle in geometry.objects().iter().filter(|o| has_edges(o)).flat_map(|o| o.triangles.clone()) {
             kinds[triangle / 16] |= (1 | u32::from(closed[triangle]) << 1) << (2 * (triangle % 16));
         }
-        let limits = device.limits();
-        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let buffer = |what: &'static str, bytes: &[u8]| {
-            if bytes.len() as u64 > limit {
-                return Err(GpuError::TooLarge { what, bytes: bytes.len() as u64, limit });
-            }
-            Ok(device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some(what),
-                // A binding must not be empty.
-                contents: if bytes.is_empty() { &[0; 64] } else { bytes },
-                usage: wgpu::BufferUsages::STORAGE,
-            }))
-        };
+        let buffer = |what, bytes| storage_buffer(device, what, bytes);
         Ok(Self {
             made_for: [scene.positions.clone(), scene.triangles.clone()],
             edges: buffer("edges", bytemuck::cast_slice(&edges))?,

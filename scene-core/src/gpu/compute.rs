@@ -1,7 +1,7 @@
 //! Compute passes: a pipeline an entry point, recorded as one pass a dispatch.
 
 use super::pipeline::shader_module;
-use super::{GpuError, Recorder};
+use super::{GpuError, Recorder, binding_limit};
 
 /// One entry point of a compute shader.
 #[derive(Debug)]
@@ -88,8 +88,7 @@ impl WorkBuffer {
     /// # Errors
     /// [`GpuError::TooLarge`] if the device binds less in one piece.
     pub fn get(&mut self, device: &wgpu::Device, bytes: u64) -> Result<wgpu::Buffer, GpuError> {
-        let limits = device.limits();
-        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let limit = binding_limit(device);
         let bytes = bytes.max(16).next_multiple_of(4);
         if bytes > limit {
             return Err(GpuError::TooLarge { what: self.label, bytes, limit });

@@ -4,9 +4,9 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use glam::Affine3A;
-use wgpu::util::DeviceExt as _;
 
 use super::GpuError;
+use super::storage::storage_buffer_for;
 use crate::geometry::{Aabb, AlphaMask, ObjectFlags, Wrap};
 use crate::{Scene, TriangleMesh};
 
@@ -131,19 +131,9 @@ impl SceneBuffers {
     /// [`GpuError::TooLarge`] if an array is larger than the device binds in one piece.
     pub fn new(device: &wgpu::Device, scene: &Scene) -> Result<Self, GpuError> {
         let buffer = |what: &'static str, bytes: &[u8], usage| {
-            let limits = device.limits();
-            let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-            if bytes.len() as u64 > limit {
-                return Err(GpuError::TooLarge { what, bytes: bytes.len() as u64, limit });
-            }
             // A binding must not be empty: an empty scene has one vertex and one triangle that nobody draws.
             let contents = if bytes.is_empty() { &[0; 12] } else { bytes };
-            let usage = usage | wgpu::BufferUsages::STORAGE;
-            Ok(device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some(what),
-                contents,
-                usage,
-            }))
+            storage_buffer_for(device, what, contents, usage)
         };
         let positions =
             buffer("vertex positions", bytemuck::cast_slice(scene.positions()), wgpu::BufferUsages::VERTEX)?;

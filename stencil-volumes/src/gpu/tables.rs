@@ -3,8 +3,7 @@
 use scene_core::Scene;
 use scene_core::bvh::Bvh;
 use scene_core::geometry::EdgeTopology;
-use scene_core::gpu::{CasterTrees, GpuError, GpuScene};
-use wgpu::util::DeviceExt as _;
+use scene_core::gpu::{CasterTrees, GpuError, GpuScene, storage_buffer};
 
 use crate::error::VolumeError;
 
@@ -68,19 +67,7 @@ impl Tables {
         for triangle in geometry.objects().iter().filter(|o| is_solid(o)).flat_map(|o| o.triangles.clone()) {
             casts[triangle / 32] |= 1 << (triangle % 32);
         }
-        let limits = device.limits();
-        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let buffer = |what: &'static str, bytes: &[u8]| {
-            if bytes.len() as u64 > limit {
-                return Err(GpuError::TooLarge { what, bytes: bytes.len() as u64, limit });
-            }
-            Ok(device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some(what),
-                // A binding must not be empty.
-                contents: if bytes.is_empty() { &[0; 64] } else { bytes },
-                usage: wgpu::BufferUsages::STORAGE,
-            }))
-        };
+        let buffer = |what, bytes| storage_buffer(device, what, bytes);
         Ok(Self {
             made_for: [scene.positions.clone(), scene.triangles.clone()],
             vertices: buffer("vertices of edges", bytemuck::cast_slice(topology.vertices()))?,

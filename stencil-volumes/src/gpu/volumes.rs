@@ -4,7 +4,7 @@ use bytemuck::Zeroable as _;
 use glam::Vec4;
 use scene_core::gpu::{
     Bound, ComputePass, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder,
-    SceneBindings, SceneGroups, VisibilityPass, VisibilityPassParts, WorkBuffer, binding,
+    SceneBindings, SceneGroups, VisibilityPass, VisibilityPassParts, WorkBuffer, binding, binding_limit,
 };
 use scene_core::light::LightPoint;
 use scene_core::technique::{Params as _, TechniqueError};
@@ -225,8 +225,7 @@ impl VolumesOnGpu {
             LightPoint::At(place) => place.extend(1.0),
             LightPoint::Towards(direction) => direction.extend(0.0),
         };
-        let limits = device.limits();
-        let limit = self.list_bytes.min(limits.max_storage_buffer_binding_size).min(limits.max_buffer_size);
+        let limit = self.list_bytes.min(binding_limit(device));
         let [columns, rows] = tiles(camera, BLOCK);
         let room = limit / (4 * u64::from(columns) * u64::from(rows)).max(1);
         let magnitude = query.scene.bounds.magnitude();
