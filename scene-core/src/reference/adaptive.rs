@@ -5,9 +5,8 @@
 
 use std::ops::ControlFlow;
 
-use super::proof::{Proof, Prover};
-use super::sampled::{Scratch, Tracer};
-use super::tiles::{Cancelled, Estimate, Reference, estimate_tiles};
+use super::sampled::{Tracer, where_not_proved};
+use super::tiles::{Cancelled, Estimate, Reference};
 use super::{Occlusion, ReferenceSettings};
 use crate::light::sampling::LightView;
 use crate::{GBuffer, Light, Scene};
@@ -38,32 +37,15 @@ pub fn adaptive_reference(
     max_error: f32,
     progress: &(dyn Fn(f32) -> ControlFlow<()> + Sync),
 ) -> Result<Reference, Cancelled> {
-    let magnitude = scene.bounds().magnitude();
-    let tree = casters.tree().filter(|_| settings.skip);
-    let prover = tree.map(|tree| Prover::new(tree, light, gbuffer, magnitude));
-    let begin = |x, y, scratch: &mut Scratch| {
-        if let Some(prover) = &prover {
-            prover.begin_tile(x, y, scratch.proofs());
-        }
-    };
     let first = ReferenceSettings { samples: FIRST, seed: settings.seed ^ FIRST_SEED, ..*settings };
-    estimate_tiles(scene, light, gbuffer, progress, Scratch::default, begin, |pixel, scratch, work| {
-        if let Some(proof) = prover.as_ref().and_then(|prover| prover.prove(pixel, scratch.proofs())) {
-            let (count, v) = match proof {
-                Proof::Lit => (&mut work.proved_lit, 1.0),
-                Proof::Dark => (&mut work.proved_dark, 0.0),
-            };
-            *count += 1;
-            return Estimate::certain(v);
-        }
-        work.sampled += 1;
+    let tracer = Tracer { casters, light, gbuffer, settings, magnitude: scene.bounds().magnitude() };
+    where_not_proved(scene, tracer, progress, |pixel, scratch, work| {
         let mut samples = settings.samples;
         if samples > FIRST && !LightView::new(light, gbuffer.position[pixel]).is_single() {
-            let tracer = Tracer { casters, light, gbuffer, settings: &first, magnitude };
-            samples = enough(tracer.pixel(pixel, scratch, work), max_error, samples);
+            let told = Tracer { settings: &first, ..tracer }.pixel(pixel, scratch, work);
+            samples = enough(told, max_error, samples);
         }
-        let settings = &ReferenceSettings { samples, ..*settings };
-        Tracer { casters, light, gbuffer, settings, magnitude }.pixel(pixel, scratch, work)
+        Tracer { settings: &ReferenceSettings { samples, ..*settings }, ..tracer }.pixel(pixel, scratch, work)
     })
 }
 

@@ -51,7 +51,18 @@ pub fn reference(
     settings: &ReferenceSettings,
     progress: &(dyn Fn(f32) -> ControlFlow<()> + Sync),
 ) -> Result<Reference, Cancelled> {
-    let magnitude = scene.bounds().magnitude();
+    let tracer = Tracer { casters, light, gbuffer, settings, magnitude: scene.bounds().magnitude() };
+    where_not_proved(scene, tracer, progress, |pixel, scratch, work| tracer.pixel(pixel, scratch, work))
+}
+
+/// V of every pixel that sees a surface: what is proved, and what `sample` says where nothing is.
+pub(super) fn where_not_proved<O: Occlusion>(
+    scene: &Scene,
+    tracer: Tracer<'_, O>,
+    progress: &(dyn Fn(f32) -> ControlFlow<()> + Sync),
+    sample: impl Fn(usize, &mut Scratch, &mut Work) -> Estimate + Sync,
+) -> Result<Reference, Cancelled> {
+    let Tracer { casters, light, gbuffer, settings, magnitude } = tracer;
     let tree = casters.tree().filter(|_| settings.skip);
     let prover = tree.map(|tree| Prover::new(tree, light, gbuffer, magnitude));
     let begin = |x, y, scratch: &mut Scratch| {
@@ -59,7 +70,6 @@ pub fn reference(
             prover.begin_tile(x, y, &mut scratch.proofs);
         }
     };
-    let tracer = Tracer { casters, light, gbuffer, settings, magnitude };
     estimate_tiles(scene, light, gbuffer, progress, Scratch::default, begin, |pixel, scratch, work| {
         match prover.as_ref().and_then(|prover| prover.prove(pixel, &mut scratch.proofs)) {
             Some(Proof::Lit) => {
@@ -72,7 +82,7 @@ pub fn reference(
             }
             None => {
                 work.sampled += 1;
-                tracer.pixel(pixel, scratch, work)
+                sample(pixel, scratch, work)
             }
         }
     })
@@ -92,6 +102,7 @@ pub(super) struct Scratch {
     proofs: Memory,
 }
 
+/// Traces the samples of a pixel.
 pub(super) struct Tracer<'a, O> {
     pub(super) casters: &'a O,
     pub(super) light: &'a Light,
@@ -101,9 +112,11 @@ pub(super) struct Tracer<'a, O> {
     pub(super) magnitude: f32,
 }
 
-impl Scratch {
-    pub(super) fn proofs(&mut self) -> &mut Memory {
-        &mut self.proofs
+impl<O> Copy for Tracer<'_, O> {}
+
+impl<O> Clone for Tracer<'_, O> {
+    fn clone(&self) -> Self {
+        *self
     }
 }
 
