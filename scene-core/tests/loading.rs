@@ -387,3 +387,18 @@ fn progress_names_every_mesh_once() {
     load_setup_with(&path, &LoadOptions { progress: Some(&record), ..Default::default() }).unwrap();
     assert_eq!(*seen.lock().unwrap(), [("a.obj".into(), 0, 3), ("b.obj".into(), 1, 3)]);
 }
+
+#[test]
+fn planar_receivers_are_marked_by_name() {
+    let folder = Folder::new();
+    folder.write("m.obj", "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\no wall\nf 1 2 3 4\no post\nf 1 2 3\n");
+    let marked = |contents: &str| {
+        let setup = folder.load("scene.toml", contents);
+        let planar = setup.scene.objects().iter().filter(|o| o.flags.planar);
+        planar.map(|o| o.name.clone()).collect::<Vec<_>>()
+    };
+    assert!(marked("meshes = ['m.obj']").is_empty());
+    // The ground that a bare scene gets has a name too.
+    assert_eq!(marked("meshes = ['m.obj']\nplanar_receivers = ['wall', 'ground']"), ["wall", "ground"]);
+    assert_eq!(marked("meshes = ['m.obj', 'm.obj']\nplanar_receivers = ['post']"), ["post", "post"]);
+}

@@ -4,6 +4,9 @@
 //! with much area are tried from the largest on, each against all triangles of the object. Only planes with at least 1/64 of the
 //! object's area become receivers, so that a receiver's drawing is never paid for a facet of a curved surface, and no object
 //! has more than 64.
+//!
+//! Where objects are named as planar receivers ([`ObjectFlags::planar`](scene_core::geometry::ObjectFlags), `planar_receivers` in a
+//! scene file), these alone are taken, and of each its 64 largest planes, however small a share of it they are.
 
 use std::collections::HashMap;
 
@@ -17,8 +20,11 @@ use crate::crossing::HomogeneousLight;
 /// by, for the same reasons ([`scene_core::bvh::shadow_origin`]).
 const TOLERANCE: f64 = 1.0 / 2_097_152.0;
 
-/// The share of an object's area that a plane needs to be a receiver.
-const SHARE: f64 = 1.0 / 64.0;
+/// Planes of an object at most.
+const MOST: usize = 64;
+
+/// The share of an object's area that a plane needs to be a receiver, unless the object is named as one.
+const SHARE: f64 = 1.0 / MOST as f64;
 
 /// A flat receiver: (n, d) of n·x + d = 0, n of unit length and turned to the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,15 +52,16 @@ impl FlatReceivers {
     /// Of a triangle that is part of no flat receiver.
     pub const NONE: u32 = u32::MAX;
 
-    /// The flat surfaces of objects that receive shadows, with the light off their plane.
+    /// The flat surfaces of objects that receive shadows, with the light off their plane; of the named ones alone, if any is.
     pub fn new(scene: &Scene, light: &Light) -> Self {
         let tolerance = f64::from(scene.bounds().magnitude()) * TOLERANCE;
         let homogeneous = HomogeneousLight::from(light.center());
         let l = homogeneous.point.extend(if homogeneous.at_infinity { 0.0 } else { 1.0 });
         let mut found =
             Self { receivers: Vec::new(), of_triangle: vec![Self::NONE; scene.triangles().len()] };
-        let objects = (0_u32..).zip(scene.objects()).filter(|(_, o)| o.flags.receives);
-        for (id, object) in objects {
+        let named = scene.objects().iter().any(|o| o.flags.planar);
+        let objects = (0_u32..).zip(scene.objects());
+        for (id, object) in objects.filter(|(_, o)| o.flags.receives && (o.flags.planar || !named)) {
             for (plane, triangles) in planes_of(scene, object, tolerance) {
                 let height = plane.dot(l);
                 let turned = if height < 0.0 { -plane } else { plane };
@@ -81,7 +88,7 @@ fn normal_of(scene: &Scene, triangle: usize) -> (DVec3, DVec3) {
     ((b - a).cross(c - a), a)
 }
 
-/// The planes of an object with [`SHARE`] of its area, and the triangles in each.
+/// The planes of an object with [`SHARE`] of its area, or the [`MOST`] largest of a named one, and the triangles in each.
 fn planes_of(scene: &Scene, object: &Object, tolerance: f64) -> Vec<(DVec4, Vec<usize>)> {
     /// Cells a unit of normal, and an extent of the object: a plane's triangles fall into a few neighbouring ones.
     const CELLS: f64 = 256.0;
@@ -106,8 +113,13 @@ fn planes_of(scene: &Scene, object: &Object, tolerance: f64) -> Vec<(DVec4, Vec<
             (cell.1, cell.2) = (triangle, area);
         }
     }
-    let mut seeds: Vec<_> = cells.into_values().filter(|cell| cell.0 >= total * SHARE / CORNERS).collect();
+    let share = if object.flags.planar { 0.0 } else { SHARE };
+    let mut seeds: Vec<_> = cells.into_values().filter(|cell| cell.0 >= total * share / CORNERS).collect();
     seeds.sort_by(|x, y| y.2.total_cmp(&x.2).then(x.1.cmp(&y.1)));
+    if object.flags.planar {
+        // Each is tried against all triangles; those that are left have smaller ones than any of these.
+        seeds.truncate(MOST * CORNERS as usize);
+    }
     let mut taken = vec![false; object.triangles.len()];
     let mut planes = Vec::new();
     for (_, seed, _) in seeds {
@@ -125,12 +137,14 @@ fn planes_of(scene: &Scene, object: &Object, tolerance: f64) -> Vec<(DVec4, Vec<
             .filter(|&t| !taken[t - first] && scene.corners(t).into_iter().all(on_plane))
             .collect();
         let area: f64 = triangles.iter().map(|&t| normal_of(scene, t).0.length()).sum();
-        if area >= total * SHARE && area > 0.0 {
+        if area >= total * share && area > 0.0 {
             triangles.iter().for_each(|&t| taken[t - first] = true);
-            planes.push((plane, triangles));
+            planes.push((area, plane, triangles));
         }
     }
-    planes
+    planes.sort_by(|x, y| y.0.total_cmp(&x.0));
+    planes.truncate(MOST);
+    planes.into_iter().map(|(_, plane, triangles)| (plane, triangles)).collect()
 }
 
 #[cfg(test)]
@@ -157,5 +171,24 @@ mod tests {
             (0_u32..).zip(ball.objects()).max_by_key(|(_, object)| object.triangles.len()).unwrap();
         assert!(!found.receivers.is_empty(), "the ground");
         assert!(found.receivers.iter().all(|receiver| receiver.object != largest), "no facet of the ball");
+    }
+
+    #[test]
+    fn named_receivers_are_taken_alone() {
+        let light = Light::Directional { direction: Vec3::new(0.3, -1.0, 0.2), angular_radius: 0.0 };
+        let mut scene = scenes::build("cornell", 0.0).unwrap().scene;
+        let all = FlatReceivers::new(&scene, &light).receivers;
+        let name = scene.objects()[all[0].object as usize].name.clone();
+        assert!(scene.mark_planar(&name) > 0 && scene.mark_planar("nobody") == 0);
+        let named = FlatReceivers::new(&scene, &light).receivers;
+        let expected: Vec<_> =
+            all.iter().filter(|r| scene.objects()[r.object as usize].name == name).copied().collect();
+        assert!(named == expected && named.len() < all.len(), "{named:?}");
+        // A ball that is named has facets, the largest ones.
+        let mut ball = scenes::build("ball", 0.0).unwrap().scene;
+        let largest = ball.objects().iter().max_by_key(|object| object.triangles.len()).unwrap().name.clone();
+        ball.mark_planar(&largest);
+        let facets = FlatReceivers::new(&ball, &light).receivers;
+        assert_eq!(facets.len(), MOST);
     }
 }

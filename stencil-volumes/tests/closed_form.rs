@@ -1,9 +1,11 @@
 //! Shadows whose outline is known in closed form.
 
+use std::path::Path;
+
 use glam::{Affine3A, Vec3};
 use gnomon_stencil_volumes::{Casters, StencilVolumes, Variant, VolumeParams};
 use scene_core::geometry::ObjectFlags;
-use scene_core::{Camera, GBuffer, Light, Scene, TriangleMesh, VisibilityImage, raster};
+use scene_core::{Camera, GBuffer, Light, Scene, SceneSetup, TriangleMesh, VisibilityImage, io, raster};
 
 /// A horizontal square around `center` with sides 2·`half`.
 fn square(center: Vec3, half: f32) -> TriangleMesh {
@@ -89,4 +91,27 @@ fn no_false_shadows_on_the_plane() {
     }
     // Snapping moves the outline by half of 1/256 pixel: of its few hundred pixels one or two lie there.
     assert!(dark > 100 && differ <= 4, "{dark} dark, {differ} differ");
+}
+
+/// Two floors under one caster: both show its shadow if nothing is said, and only the one that the scene file names.
+#[test]
+fn planar_shadows_fall_on_the_receivers_that_a_scene_file_names() {
+    let setup = |file: &str| {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scenes").join(file);
+        io::load_setup(&path).expect("a sound scene file")
+    };
+    let dark = |setup: &SceneSetup, object: &str| {
+        let (scene, camera) = (&setup.scene, &setup.camera);
+        let gbuffer = raster::render_gbuffer(scene, camera);
+        let casters = Casters::new(scene).expect("few triangles");
+        let technique = StencilVolumes::new(VolumeParams { variant: Variant::Planar, ..Default::default() });
+        let mut visibility = VisibilityImage::new(camera.width, camera.height);
+        technique.prepare(&casters, &setup.lights[0], camera).0.shade(&gbuffer, &mut visibility);
+        let on = |p: usize| gbuffer.is_seen(p) && scene.objects()[gbuffer.object[p] as usize].name == object;
+        (0..gbuffer.pixel_count()).filter(|&p| on(p) && visibility.values[p] == 0.0).count()
+    };
+    let (found, named) = (setup("two_floors.toml"), setup("two_floors_one_named.toml"));
+    assert!(dark(&found, "left") > 50 && dark(&found, "right") > 50);
+    assert_eq!(dark(&found, "left"), dark(&named, "left"));
+    assert_eq!(dark(&named, "right"), 0);
 }

@@ -19,11 +19,14 @@ pub struct ObjectFlags {
     pub dynamic: bool,
     /// May be drawn as points by techniques that can: for what is finer than they resolve, such as leaves far off.
     pub points: bool,
+    /// Named as a flat surface that shadows fall on. Where a scene has such objects, techniques that look for flat receivers
+    /// take these alone.
+    pub planar: bool,
 }
 
 impl Default for ObjectFlags {
     fn default() -> Self {
-        Self { casts: true, receives: true, dynamic: false, points: false }
+        Self { casts: true, receives: true, dynamic: false, points: false, planar: false }
     }
 }
 
@@ -148,6 +151,12 @@ impl Scene {
             (bounds.min, bounds.max) = (bounds.min - origin, bounds.max - origin);
         }
         moved
+    }
+
+    /// Marks the objects of a name as flat receivers ([`ObjectFlags::planar`]); how many there are.
+    pub fn mark_planar(&mut self, name: &str) -> usize {
+        let named = self.objects.iter_mut().filter(|object| object.name == name);
+        named.map(|object| object.flags.planar = true).count()
     }
 
     /// Vertex positions in world space.

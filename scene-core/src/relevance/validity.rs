@@ -75,7 +75,11 @@ mod tests {
         let mut scene = Scene::new();
         for (casts, receives) in [(true, true), (false, true), (true, false), (false, false)] {
             scene
-                .add(&mesh, Affine3A::IDENTITY, ObjectFlags { casts, receives, dynamic: true, points: false })
+                .add(
+                    &mesh,
+                    Affine3A::IDENTITY,
+                    ObjectFlags { casts, receives, dynamic: true, ..Default::default() },
+                )
                 .unwrap();
         }
         scene

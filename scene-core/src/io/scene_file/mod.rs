@@ -15,6 +15,7 @@
 //! | `camera.near`, `.far` | clip distances | a hundredth of the way to the target; infinite |
 //! | `camera.width`, `.height` | pixels | 512 |
 //! | `light` or `lights` | a table or several | chosen by [`framing`] |
+//! | `planar_receivers` | names of objects whose flat faces show planar shadows, and no others do | found by their area |
 //!
 //! | `kind` | fields |
 //! | --- | --- |
@@ -25,6 +26,7 @@
 //! | `point` | `position` |
 //! | `spot` | `position`, `direction`, `outer_deg`, `inner_deg` (= outer) |
 //!
+//! Objects have the names that their mesh file gives them, a made-up ground is `ground`; a name that several have stands for all.
 //! A key that is not listed is an error. Cameras and lights inside a mesh file are not used. With neither
 //! camera nor light, the scene gets a ground too, like a bare mesh.
 
@@ -95,7 +97,39 @@ pub(super) fn load(path: &Path, options: &LoadOptions<'_>) -> Result<SceneSetup,
         notes,
     };
     framing::complete(&mut setup, camera, up).map_err(unframed)?;
+    // Last, so that a ground which was made up can be named.
+    if let Some(names) = &scene_file.planar_receivers {
+        mark_planar(&mut setup.scene, names).map_err(|(element, message)| element_fault(element, message))?;
+    }
     Ok(setup)
+}
+
+/// Marks the named objects as flat receivers. A fault is an element of the file and a sentence.
+fn mark_planar(scene: &mut Scene, names: &[String]) -> Result<(), (String, String)> {
+    /// Names that a message lists.
+    const LISTED: usize = 8;
+    let element = |index: usize| format!("planar_receivers[{index}]");
+    if names.is_empty() {
+        let message = "there are none: name some, or leave the field out to have them found".to_owned();
+        return Err(("planar_receivers".to_owned(), message));
+    }
+    for (index, name) in names.iter().enumerate() {
+        if scene.mark_planar(name) == 0 {
+            let mut known: Vec<_> =
+                scene.objects().iter().map(|object| format!("'{}'", object.name)).collect();
+            known.sort();
+            known.dedup();
+            let rest = known.len().saturating_sub(LISTED);
+            known.truncate(LISTED);
+            let rest = if rest > 0 { format!(" and {rest} more") } else { String::new() };
+            let message = format!("there is no object '{name}': there are {}{rest}", known.join(", "));
+            return Err((element(index), message));
+        }
+        if scene.objects().iter().all(|object| object.name != *name || !object.flags.receives) {
+            return Err((element(index), format!("'{name}' does not receive shadows")));
+        }
+    }
+    Ok(())
 }
 
 /// Reads every mesh file once and places its instances.
@@ -139,6 +173,7 @@ fn load_meshes(
             receives: table.receives.unwrap_or(true),
             dynamic: table.dynamic.unwrap_or(false),
             points: table.points.unwrap_or(false),
+            planar: false,
         };
         files[mesh_path].add_to(&mut scene, *world_from_mesh, flags, mesh_path, options).map_err(within)?;
     }

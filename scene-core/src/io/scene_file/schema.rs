@@ -15,6 +15,7 @@ pub(super) struct SceneFile {
     pub(super) light: Option<LightEntry>,
     #[serde(default)]
     pub(super) lights: Vec<LightEntry>,
+    pub(super) planar_receivers: Option<Vec<String>>,
 }
 
 /// A mesh: its path, or a table.
