@@ -13,7 +13,7 @@ use gnomon_stencil_volumes::silhouette::extract;
 use gnomon_stencil_volumes::{Casters, Count, StencilVolumes, VolumeParams};
 use scene_core::bvh::Bvh;
 use scene_core::geometry::facing;
-use scene_core::{Camera, VisibilityImage, raster, scenes};
+use scene_core::{Camera, Report, SceneSetup, VisibilityImage, raster, scenes};
 
 fn methods(criterion: &mut Criterion) {
     for spec in ["ball", "knot", "log-cabin", "chess"] {
@@ -38,12 +38,39 @@ fn methods(criterion: &mut Criterion) {
     }
 }
 
+/// What one frame of each kind takes and leaves out.
+fn frames(spec: &str, setup: &SceneSetup, camera: &Camera) {
+    let gbuffer = raster::render_gbuffer(&setup.scene, camera);
+    let casters = Casters::new(&setup.scene).expect("few triangles");
+    let mut visibility = VisibilityImage::new(camera.width, camera.height);
+    for (skip, rays) in [(true, true), (false, true), (true, false), (false, false)] {
+        let technique = StencilVolumes::new(VolumeParams { skip, rays, ..Default::default() });
+        let mut best = (f64::INFINITY, Report::default());
+        for _ in 0..3 {
+            let start = std::time::Instant::now();
+            let (prepared, mut report) = technique.prepare(&casters, &setup.lights[0], camera);
+            report.merge(&prepared.shade(&gbuffer, &mut visibility));
+            let ms = start.elapsed().as_secs_f64() * 1e3;
+            if ms < best.0 {
+                best = (ms, report);
+            }
+        }
+        let (ms, report) = best;
+        println!(
+            "{spec}, {}², skip {skip}, rays {rays}: {ms:.2} ms; {:.2?}; left out: {:?}",
+            camera.width, report.stages_ms, report.skipped
+        );
+    }
+}
+
 /// A view of a corner of a large scene, with culling and without.
 fn culling(criterion: &mut Criterion) {
     for spec in ["street", "forest:triangles=200000"] {
         let setup = scenes::build(spec, 0.0).expect("a built-in scene");
         let (scene, light) = (&setup.scene, setup.lights[0]);
         let camera = Camera { fov_y: 0.12, ..setup.camera.with_size(256, 256) };
+        frames(spec, &setup, &setup.camera.with_size(512, 512));
+        frames(spec, &setup, &camera);
         let gbuffer = raster::render_gbuffer(scene, &camera);
         let casters = Casters::new(scene).expect("few triangles");
         let mut visibility = VisibilityImage::new(256, 256);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};
 use scene_core::bvh::Bvh;
-use scene_core::geometry::{Aabb, EdgeTopology, facing_of};
+use scene_core::geometry::{Aabb, EdgeTopology, Object, facing_of};
 use scene_core::light::LightPoint;
 use scene_core::relevance::{CasterChunks, CasterRegion, Receivers, relevant_casters};
 use scene_core::{Camera, Light, Report, Scene};
@@ -13,6 +13,7 @@ use scene_core::{Camera, Light, Report, Scene};
 use crate::crossing::HomogeneousLight;
 use crate::error::VolumeError;
 use crate::masked::MaskedCasters;
+use crate::silhouette::EdgeRuns;
 
 /// Edges and bounds of a scene's casters. Independent of light and camera.
 #[derive(Clone, Debug)]
@@ -21,6 +22,8 @@ pub struct Casters<'a> {
     pub scene: &'a Scene,
     /// Edges of everything that casts and has no mask, welded across objects.
     pub topology: EdgeTopology,
+    /// Their faces, run by run.
+    pub runs: EdgeRuns,
     /// Where the casters with masks are.
     pub masked: MaskedCasters,
     /// Bounds of runs of triangles.
@@ -39,13 +42,15 @@ impl<'a> Casters<'a> {
             || EdgeTopology::of_scene(scene, |object| object.flags.casts && object.alpha.is_none()),
             || Arc::new(Bvh::casters(scene)),
         );
+        let topology = topology?;
+        let runs = EdgeRuns::new(&topology);
         let masked = MaskedCasters::new(scene);
-        Ok(Self { scene, topology: topology?, masked, chunks: CasterChunks::new(scene), tree })
+        Ok(Self { scene, topology, runs, masked, chunks: CasterChunks::new(scene), tree })
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.topology.bytes() + self.chunks.bytes() + self.tree.bytes()
+        self.topology.bytes() + self.runs.bytes() + self.chunks.bytes() + self.tree.bytes()
     }
 
     /// All casting triangles, as ranges of [`Scene::triangles`].
@@ -71,14 +76,22 @@ impl<'a> Casters<'a> {
     fn in_anothers_shadow(&self, light: &Light) -> Vec<u32> {
         /// Large triangles tried. Each costs an object some 20 ns.
         const COVERS: usize = 16;
+        /// Objects and triangles of each that are looked at for large ones: some 50 µs in all.
+        const ASKED: usize = 64;
         let (scene, center) = (self.scene, light.center());
         let homogeneous = HomogeneousLight::from(center);
         let casters =
             || (0_u32..).zip(scene.objects()).filter(|(_, o)| o.flags.casts && !o.bounds.is_empty());
-        // Of large meshes only a few triangles are asked: their triangles are small.
-        let mut covers: Vec<(f64, [Vec3; 3])> = casters()
-            .filter(|(_, object)| object.alpha.is_none())
-            .flat_map(|(_, object)| object.triangles.clone().step_by(object.triangles.len().div_ceil(64)))
+        // Of many objects the largest are asked, and of large meshes only a few triangles: their triangles are small.
+        let mut large: Vec<_> = casters().filter(|(_, object)| object.alpha.is_none()).collect();
+        if large.len() > ASKED {
+            let size = |object: &Object| object.bounds.diagonal();
+            large.select_nth_unstable_by(ASKED, |a, b| size(b.1).total_cmp(&size(a.1)).then(a.0.cmp(&b.0)));
+            large.truncate(ASKED);
+        }
+        let mut covers: Vec<(f64, [Vec3; 3])> = large
+            .into_iter()
+            .flat_map(|(_, object)| object.triangles.clone().step_by(object.triangles.len().div_ceil(ASKED)))
             .map(|triangle| {
                 let corners = scene.corners(triangle);
                 (apparent_size(corners, &homogeneous), corners)

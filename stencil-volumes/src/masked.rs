@@ -36,7 +36,12 @@ impl MaskedCasters {
     }
 
     /// Whether one of them may lie between a point and the light, erring to yes.
+    #[inline(always)]
     pub fn may_block(&self, origin: DVec3, light: LightPoint) -> bool {
+        !self.is_empty() && self.meets_a_box(origin, light)
+    }
+
+    fn meets_a_box(&self, origin: DVec3, light: LightPoint) -> bool {
         let (way, end) = match light {
             LightPoint::At(place) => (place.as_dvec3() - origin, 1.0),
             LightPoint::Towards(direction) => (direction.as_dvec3(), f64::INFINITY),

@@ -88,12 +88,13 @@ impl Screen {
     }
 
     /// Whether a place is seen so far beside its pixel's centre that it cannot be counted.
+    #[inline(always)]
     pub fn is_off_center(&self, point: &SeenPoint) -> bool {
         let [corner, right, down] = self.rays;
         let depth = self.depth(point.from_eye);
         let beside = point.from_eye - (corner + right * point.center[0] + down * point.center[1]) * depth;
-        let steps = |axis: DVec3| beside.dot(axis).abs() / (axis.length_squared() * depth);
-        !(depth > 0.0 && steps(right) <= OFF_CENTER && steps(down) <= OFF_CENTER)
+        let is_near = |axis: DVec3| beside.dot(axis).abs() <= axis.length_squared() * depth * OFF_CENTER;
+        !(depth > 0.0 && is_near(right) && is_near(down))
     }
 
     /// An edge on the screen. Its ends are positions of the scene, which f32 holds.

@@ -17,7 +17,7 @@ use crate::crossing::{Edge, HomogeneousLight, back_cap, cap_crossing, crossing};
 use crate::masked::MaskedCasters;
 use crate::outline::{Screen, ScreenEdge};
 use crate::params::{Count, VolumeParams};
-use crate::silhouette::extract;
+use crate::silhouette::extract_within;
 
 /// A face turned to the light.
 #[derive(Clone, Copy, Debug)]
@@ -55,6 +55,8 @@ pub struct Volumes {
     pub masked: MaskedCasters,
     /// Sides a tile above which its pixels are traced.
     pub dense: u32,
+    /// Whether there are so many edges that all pixels are traced; then none is kept.
+    pub all_dense: bool,
 }
 
 /// Sides a tile above which its pixels are traced: to count a side at 64 pixels takes some 100 ns, a ray 150.
@@ -83,25 +85,22 @@ impl Volumes {
         let facing = report.time("prepare.facing", |_| facing_in(casters, &relevant, light));
         let near = report.time("prepare.relevance", |_| near_casters(casters, light, camera));
         let split = Split::new(casters, &facing, &near, count);
-        let mut edges = Vec::new();
-        let mut from_eye = 0;
-        report.time("prepare.silhouette", |_| {
-            for (group, facing) in [&split.from_eye, &split.from_infinity].into_iter().enumerate() {
-                if let Some(facing) = facing {
-                    edges.extend(extract(&casters.topology, scene.positions(), facing));
-                }
-                if group == 0 {
-                    from_eye = edges.len();
-                }
-            }
+        let most = if rays { most_edges(camera) } else { usize::MAX };
+        let found = report.time("prepare.silhouette", |_| {
+            let edges = (&casters.topology, &casters.runs);
+            let of = |facing: &Option<Vec<i8>>, most: usize| match facing {
+                Some(facing) => extract_within(edges, scene.positions(), facing, &relevant, most),
+                None => Some(Vec::new()),
+            };
+            let mut found = of(&split.from_eye, most)?;
+            let from_eye = found.len();
+            found.extend(of(&split.from_infinity, most - from_eye)?);
+            Some((found, from_eye))
         });
+        let all_dense = found.is_none();
+        let (edges, from_eye) = found.unwrap_or_default();
         let homogeneous = HomogeneousLight::from(light.center());
         let screen = Screen::new(camera);
-        let all_dense = rays && edges.len() > most_edges(camera);
-        if all_dense {
-            edges = Vec::new();
-            from_eye = 0;
-        }
         let (sides, outlines) = report.time("prepare.sides", |_| {
             let sides: Vec<_> =
                 edges.par_chunks(LANES).with_min_len(64).map(|e| SideGroup::new(e, &homogeneous)).collect();
@@ -142,13 +141,8 @@ impl Volumes {
             near: f64::from(camera.near),
             tree: casters.tree.clone(),
             masked: casters.masked.clone(),
-            dense: if all_dense {
-                0
-            } else if rays {
-                DENSE
-            } else {
-                u32::MAX
-            },
+            dense: if rays { DENSE } else { u32::MAX },
+            all_dense,
         }
     }
 

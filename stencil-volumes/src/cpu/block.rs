@@ -100,8 +100,7 @@ impl Block {
         // finds may lie behind another. From there nothing can be counted.
         let is_before_all = |place: DVec3| !volumes.tree.is_occluded(place.as_vec3(), eye);
         for (index, sides) in sides.into_iter().enumerate() {
-            let is_dense = sides > volumes.dense || volumes.dense == 0;
-            if is_dense || !block.tiles[index].choose_start(is_before_all) {
+            if sides > volumes.dense || !block.tiles[index].choose_start(is_before_all) {
                 block.trace(index, volumes, receivers.light.center());
             }
         }
@@ -210,8 +209,7 @@ impl Block {
                             self.work.traced += 1;
                             continue;
                         }
-                        let place = origin.to_array().map(f64::from);
-                        tile.push(row * TILE + column, place, f64::from(gbuffer.depth[pixel]));
+                        tile.push(row * TILE + column, origin.to_array(), f64::from(gbuffer.depth[pixel]));
                     }
                 }
             }
@@ -274,7 +272,7 @@ impl Block {
                     self.work.traced += 1;
                     // The place is an f32 that was widened.
                     !volumes.tree.is_occluded(tile.place(i).as_vec3(), light)
-                } else if starts[index] + tile.counts[i] as i32 != 0 {
+                } else if starts[index] + tile.count(i) != 0 {
                     false
                 } else if volumes.masked.may_block(tile.place(i), light) {
                     self.work.asked_of_masks += 1;

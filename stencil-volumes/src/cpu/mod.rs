@@ -19,6 +19,9 @@
 mod block;
 pub mod planar;
 mod tile;
+mod traced;
+
+use std::ops::AddAssign;
 
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
@@ -54,6 +57,19 @@ pub struct Work {
     pub free_of_masks: u64,
     /// Pairs of a side and a tile that were counted pixel by pixel.
     pub pairs: u64,
+}
+
+impl AddAssign for Work {
+    fn add_assign(&mut self, other: Self) {
+        self.tiles += other.tiles;
+        self.uniform += other.uniform;
+        self.asked += other.asked;
+        self.unreached += other.unreached;
+        self.traced += other.traced;
+        self.asked_of_masks += other.asked_of_masks;
+        self.free_of_masks += other.free_of_masks;
+        self.pairs += other.pairs;
+    }
 }
 
 /// Which pixels' visibility is a question, and where they are.
@@ -114,6 +130,9 @@ pub fn shade(
     if columns * rows == 0 {
         return Work::default();
     }
+    if volumes.all_dense {
+        return traced::shade(volumes, receivers, report, visibility);
+    }
     let level = Level::new();
     let mut blocks: Vec<Block> = report.time("shade.tiles", |_| {
         let blocks = (0..columns * rows).into_par_iter();
@@ -137,16 +156,7 @@ pub fn shade(
         });
     });
     let mut work = Work::default();
-    for block in &blocks {
-        work.tiles += block.work.tiles;
-        work.uniform += block.work.uniform;
-        work.asked += block.work.asked;
-        work.unreached += block.work.unreached;
-        work.traced += block.work.traced;
-        work.asked_of_masks += block.work.asked_of_masks;
-        work.free_of_masks += block.work.free_of_masks;
-        work.pairs += block.work.pairs;
-    }
+    blocks.iter().for_each(|block| work += block.work);
     report.time("shade.write", |_| {
         visibility.values.par_chunks_mut(width).enumerate().for_each(|(y, values)| {
             for (x, value) in values.iter_mut().enumerate() {

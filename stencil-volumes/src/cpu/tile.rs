@@ -20,15 +20,13 @@ pub(super) struct Tile {
     /// How many there are.
     pub(super) len: usize,
     /// Places, one array an axis.
-    pub(super) place: [[f64; PIXELS]; 3],
-    /// Their centres in steps, one array an axis.
-    pub(super) center: [[f64; PIXELS]; 2],
+    place: [[f32; PIXELS]; 3],
     /// Which pixel of the tile each is, row by row.
     pub(super) pixel: [u8; PIXELS],
     /// Which of them stands for the tile.
     pub(super) start: usize,
-    /// Faces between each and the light, less those of the start.
-    pub(super) counts: [f64; PIXELS],
+    /// Faces between each and the light, less those of the start; none where no side and no edge passes.
+    counts: Option<Box<[f64; PIXELS]>>,
     /// Bits of those that are so close to an edge that they are traced.
     pub(super) close: u64,
     /// Centre of the tile's first pixel, in steps.
@@ -41,10 +39,9 @@ impl Tile {
     pub(super) const EMPTY: Self = Self {
         len: 0,
         place: [[0.0; PIXELS]; 3],
-        center: [[0.0; PIXELS]; 2],
         pixel: [0; PIXELS],
         start: 0,
-        counts: [0.0; PIXELS],
+        counts: None,
         close: 0,
         corner: [0.0; 2],
         depth: f64::NEG_INFINITY,
@@ -52,26 +49,36 @@ impl Tile {
 
     #[inline(always)]
     pub(super) fn place(&self, index: usize) -> DVec3 {
-        DVec3::new(self.place[0][index], self.place[1][index], self.place[2][index])
+        DVec3::new(
+            f64::from(self.place[0][index]),
+            f64::from(self.place[1][index]),
+            f64::from(self.place[2][index]),
+        )
     }
 
     /// Adds an asked pixel; there is room for all of a tile's.
-    pub(super) fn push(&mut self, pixel: usize, place: [f64; 3], depth: f64) {
-        const STEPS: f64 = scene_core::raster::SnappedView::STEPS as f64;
+    pub(super) fn push(&mut self, pixel: usize, place: [f32; 3], depth: f64) {
         let at = self.len;
         for (axis, coordinate) in self.place.iter_mut().zip(place) {
             axis[at] = coordinate;
         }
-        self.center[0][at] = self.corner[0] + (pixel % TILE) as f64 * STEPS;
-        self.center[1][at] = self.corner[1] + (pixel / TILE) as f64 * STEPS;
         self.pixel[at] = pixel as u8;
         self.depth = self.depth.max(depth);
         self.len += 1;
     }
 
     /// The centre of an asked pixel in steps.
+    #[inline(always)]
     pub(super) fn center(&self, index: usize) -> [f64; 2] {
-        [self.center[0][index], self.center[1][index]]
+        const STEPS: f64 = scene_core::raster::SnappedView::STEPS as f64;
+        let pixel = usize::from(self.pixel[index]);
+        [self.corner[0] + (pixel % TILE) as f64 * STEPS, self.corner[1] + (pixel / TILE) as f64 * STEPS]
+    }
+
+    /// Faces between an asked pixel and the light, less those of the start.
+    #[inline(always)]
+    pub(super) fn count(&self, index: usize) -> i32 {
+        self.counts.as_ref().map_or(0, |counts| counts[index] as i32)
     }
 
     /// Chooses the pixel that stands for the tile: the middlemost of those that are close to no edge and whose place serves. Whether
@@ -86,18 +93,39 @@ impl Tile {
         start.is_some()
     }
 
-    /// Eight values of an array.
+    /// Eight places.
     #[inline(always)]
-    fn load<S: Simd>(simd: S, values: &[f64; PIXELS], at: usize) -> f64x8<S> {
-        f64x8::from_slice(simd, &values[at..at + LANES])
+    fn places<S: Simd>(&self, simd: S, at: usize) -> [f64x8<S>; 3] {
+        let mut wide = [[0.0; LANES]; 3];
+        for (wide, values) in wide.iter_mut().zip(&self.place) {
+            for (wide, &value) in wide.iter_mut().zip(&values[at..at + LANES]) {
+                *wide = f64::from(value);
+            }
+        }
+        [
+            f64x8::from_slice(simd, &wide[0]),
+            f64x8::from_slice(simd, &wide[1]),
+            f64x8::from_slice(simd, &wide[2]),
+        ]
+    }
+
+    /// Eight centres in steps.
+    #[inline(always)]
+    fn centers<S: Simd>(&self, simd: S, at: usize) -> [f64x8<S>; 2] {
+        let mut wide = [[0.0; LANES]; 2];
+        for lane in 0..LANES {
+            [wide[0][lane], wide[1][lane]] = self.center(at + lane);
+        }
+        [f64x8::from_slice(simd, &wide[0]), f64x8::from_slice(simd, &wide[1])]
     }
 
     /// Adds the multiplicity where `passes`; one that passes the other way is negative.
     #[inline(always)]
     fn book<S: Simd>(&mut self, simd: S, at: usize, multiplicity: i32, passes: mask64x8<S>) {
         let (zero, m) = (f64x8::splat(simd, 0.0), f64x8::splat(simd, f64::from(multiplicity)));
-        let counts = Self::load(simd, &self.counts, at) + passes.select(m, zero);
-        counts.store_slice(&mut self.counts[at..at + LANES]);
+        let counts = &mut self.counts.get_or_insert_with(|| Box::new([0.0; PIXELS]))[at..at + LANES];
+        let sums = f64x8::from_slice(simd, counts) + passes.select(m, zero);
+        sums.store_slice(counts);
     }
 
     /// Adds what the chords from the start to every pixel cross of a side: [`crate::crossing::crossing`] for each.
@@ -109,11 +137,7 @@ impl Tile {
         let begins = edge.is_outside(plane, apex);
         // What lies past the last pixel is zero, and nobody reads its count.
         for at in (0..self.len).step_by(LANES) {
-            let place = [
-                Self::load(simd, &self.place[0], at),
-                Self::load(simd, &self.place[1], at),
-                Self::load(simd, &self.place[2], at),
-            ];
+            let place = self.places(simd, at);
             let ends = dot_from(simd, plane, place, edge.a).simd_ge(0.0);
             // Nothing is crossed by a chord whose ends lie on one side.
             let changes = if begins { !ends } else { ends };
@@ -145,7 +169,7 @@ impl Tile {
         };
         let reach = ((b[0] - a[0]).abs() + (b[1] - a[1]).abs()).max(1.0) * CLOSE;
         for at in (0..self.len).step_by(LANES) {
-            let (x, y) = (Self::load(simd, &self.center[0], at), Self::load(simd, &self.center[1], at));
+            let [x, y] = self.centers(simd, at);
             // Integers below 2⁵³: exact in any order.
             let value = (y - a[1]) * (b[0] - a[0]) - (x - a[0]) * (b[1] - a[1]);
             let near = value.abs().simd_le(reach)
@@ -167,11 +191,7 @@ impl Tile {
         let past = |v: DVec3| (v - eye).cross(from_eye);
         let (past_a, past_b) = (past(edge.a), past(edge.b));
         for at in (0..self.len).step_by(LANES) {
-            let place = [
-                Self::load(simd, &self.place[0], at),
-                Self::load(simd, &self.place[1], at),
-                Self::load(simd, &self.place[2], at),
-            ];
+            let place = self.places(simd, at);
             let right = dot_from(simd, outline.normal(), place, eye).simd_ge(0.0);
             let other = if from_right { !right } else { right };
             if !other.any_true() {
