@@ -186,7 +186,9 @@ impl Lookup<'_> {
             locate(windows, point)
                 .map_or(1.0, |(window, at)| window.look_up(at.texel, at.t, Vec2::ZERO, self.radius))
         };
-        of(self.windows) * of(self.moving)
+        // Windows of parts come first, and answer for surfaces alone.
+        let parts = self.windows.partition_point(|window| window.layout.is_of_part());
+        of(&self.windows[parts..]) * of(self.moving)
     }
 }
 

@@ -25,15 +25,19 @@ use std::sync::Arc;
 use glam::Vec3;
 use gnomon_shadow_map::receiver_plane::plane_tolerance;
 use scene_core::geometry::Object;
-use scene_core::relevance;
-use scene_core::{GBuffer, Light, Report, Scene, VisibilityImage};
+use scene_core::relevance::{self, CasterRegion, Receivers};
+use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
 
 use cpu::{Lookup, Window};
 use functions::Functions;
 use grid::PixelGrid;
+use layout::{Layout, Part};
 pub use params::{ErrorMeasure, PdsmParams, Precision};
 use surfaces::Surfaces;
 pub use technique::Factory;
+
+/// Texels a side of the one map of a light without extent, unless its setting says more: the index alone takes 64 MiB.
+const MOST_OF_ONE_MAP: u32 = 4096;
 
 /// The technique: settings, from which any number of lights can be prepared.
 #[derive(Clone, Copy, Debug, Default)]
@@ -41,7 +45,8 @@ pub struct Pdsm {
     params: PdsmParams,
 }
 
-/// The functions of one light, borrowing the scene they were made from. They hold for any camera.
+/// The functions of one light, borrowing the scene they were made from. They hold for any camera; windows of what one camera
+/// sees ([`Pdsm::prepare_for`]) are of use to it alone.
 #[derive(Debug)]
 pub struct PreparedPdsm<'a> {
     scene: &'a Scene,
@@ -60,16 +65,40 @@ impl Pdsm {
     }
 
     /// The maps' resolution and the PDSM's pixels on it.
-    fn grid(&self) -> (u32, PixelGrid) {
-        let size = self.params.pdsm_size.max(1);
-        let ratio = self.params.map_size.div_ceil(size).max(1);
+    ///
+    /// A light without extent takes one map, which gets the texels of all `views` of them, shared by the scene's window and
+    /// those of what is seen: it has no penumbra that would hide how coarse they are. [`MOST_OF_ONE_MAP`] a side at most.
+    fn grid(&self, light: &Light) -> (u32, PixelGrid) {
+        let PdsmParams { views, map_size, pdsm_size, cascades, .. } = self.params;
+        let (mut map_size, mut size) = (map_size, pdsm_size.max(1));
+        if !light.is_extended() {
+            let times = (views / (1 + cascades)).isqrt().max(1);
+            let larger = |side: u32| side.saturating_mul(times).min(MOST_OF_ONE_MAP).max(side);
+            (map_size, size) = (larger(map_size), larger(size));
+        }
+        let ratio = map_size.div_ceil(size).max(1);
         (size * ratio, PixelGrid { size, ratio })
     }
 
-    /// Builds the PDSM of `light`, all casters in one.
+    /// Builds the PDSM of `light`, all casters in one, for any camera.
     pub fn prepare<'a>(&self, scene: &'a Scene, light: &Light) -> (PreparedPdsm<'a>, Report) {
+        self.for_any_camera().prepare_for(scene, light, None)
+    }
+
+    /// The same without `cascades`.
+    fn for_any_camera(&self) -> Self {
+        Self::new(PdsmParams { cascades: 0, ..self.params })
+    }
+
+    /// [`prepare`](Self::prepare), with windows of their own for up to `cascades` parts of what `camera` sees.
+    pub fn prepare_for<'a>(
+        &self,
+        scene: &'a Scene,
+        light: &Light,
+        camera: Option<&Camera>,
+    ) -> (PreparedPdsm<'a>, Report) {
         let mut report = Report::default();
-        let (windows, tolerance) = self.windows(scene, light, |_| true, &mut report);
+        let (windows, tolerance) = self.windows(scene, light, camera, |_| true, &mut report);
         let (light, moving) = (*light, Arc::default());
         (PreparedPdsm { scene, light, windows, moving, tolerance, params: self.params }, report)
     }
@@ -79,27 +108,39 @@ impl Pdsm {
         &self,
         scene: &Scene,
         light: &Light,
+        camera: Option<&Camera>,
         meant: impl Fn(&Object) -> bool,
         report: &mut Report,
     ) -> (Arc<[Window]>, f32) {
         let PdsmParams { views, seed, filter_radius, precision, only_surfaces, skip, .. } = self.params;
         let tolerance = plane_tolerance(scene.bounds(), light);
-        let (map_size, grid) = self.grid();
+        let (map_size, grid) = self.grid(light);
         let (casters, (layouts, skipped)) = report.time("prepare.layout", |report| {
-            let told = relevance::told_apart(scene, light, tolerance);
+            let told = relevance::told_apart_with_solids(scene, light, tolerance);
             report.skip("casters", told.backdrops.iter().filter(|object| meant(object)).count() as u64);
             let casters: Vec<_> = told.drawn.into_iter().filter(|object| meant(object)).collect();
             let layouts = layout::layouts(scene, &casters, light, views, map_size, seed);
             (casters, layouts)
         });
         report.skip("windows", skipped);
-        let windows: Arc<[Window]> = layouts
+        let of_view = camera.map_or_else(Vec::new, |camera| {
+            report.time("prepare.layout", |_| {
+                let rim = (filter_radius + 1) * grid.ratio;
+                let parts = layout::parts(scene, light, camera, self.params.cascades, rim);
+                parts.iter().filter_map(|part| self.of_part(scene, light, &casters, &layouts, part)).collect()
+            })
+        });
+        // The windows of parts first: where they hold a point, they are the finer ones.
+        let of_scene = layouts.into_iter().map(|layout| (layout, casters.clone()));
+        let windows: Arc<[Window]> = of_view
             .into_iter()
-            .map(|layout| {
+            .chain(of_scene)
+            .map(|(layout, casters)| {
                 let (events, rows) = report
                     .time("prepare.events", |_| cpu::collect_events(scene, &casters, &layout, grid, skip));
                 report.skip("map rows without casters", rows);
-                let surfaces = only_surfaces.then(|| {
+                // Free points are none of a part's business: it keeps V at surfaces alone.
+                let surfaces = (only_surfaces || layout.is_of_part()).then(|| {
                     report.time("prepare.surfaces", |_| {
                         Surfaces::new(scene, &layout, grid, tolerance, filter_radius)
                     })
@@ -122,6 +163,36 @@ impl Pdsm {
         report.bytes += windows.iter().map(|window| window.functions.bytes()).sum::<u64>();
         (windows, tolerance)
     }
+
+    /// The window of a part of what is seen, with the casters that can shadow it. `None` where it would not show more than
+    /// the scene's own: that softens by less than a pixel, or its texels are less than twice as long along a side.
+    fn of_part<'o>(
+        &self,
+        scene: &Scene,
+        light: &Light,
+        casters: &[&'o Object],
+        of_scene: &[Layout],
+        part: &Part,
+    ) -> Option<(Layout, Vec<&'o Object>)> {
+        let PdsmParams { views, seed, .. } = self.params;
+        let (map_size, grid) = self.grid(light);
+        let middle = part.bounds.center();
+        let coarse = of_scene.iter().find(|layout| layout.locate(middle).is_some())?.texel_area(middle);
+        // Interpolation softens by two pixels of the PDSM.
+        let softened = coarse * (2 * grid.ratio).pow(2) as f32;
+        if softened <= part.pixel * part.pixel {
+            return None;
+        }
+        // A texel stands for what its light passes: receivers are grown by what lookups reach around them.
+        let reach = part.bounds.diagonal() * (self.params.filter_radius + 1) as f32 / grid.size as f32;
+        let receivers = Receivers::within(scene, &[part.bounds], light).grown(f64::from(reach));
+        let region = CasterRegion::between(scene, &receivers, light);
+        let casters: Vec<_> =
+            casters.iter().copied().filter(|object| region.touches(&object.bounds)).collect();
+        let layout = layout::layout_of_part(scene, &casters, light, views, map_size, seed, part)?;
+        let is_finer = layout.texel_area(middle) * 4.0 <= coarse;
+        is_finer.then_some((layout, casters))
+    }
 }
 
 impl PreparedPdsm<'_> {
@@ -141,7 +212,30 @@ impl PreparedPdsm<'_> {
         if self.params.bilinear { self.params.filter_radius.max(1) } else { 0 }
     }
 
-    /// The windows, with their functions.
+    /// Whether it would be the same for any other camera.
+    pub fn survives_camera(&self) -> bool {
+        !self.windows.iter().any(|window| window.layout.is_of_part())
+    }
+
+    /// Leaves out windows of parts, the farthest first, until the nodes of all take no more than `most` bytes; how many
+    /// that were.
+    #[cfg(feature = "gpu")]
+    fn leave_out_parts(&mut self, most: u64) -> u64 {
+        let bytes = |window: &Window| size_of_val(window.functions.nodes().words()) as u64;
+        let mut all: u64 = self.windows.iter().map(bytes).sum();
+        let parts = self.windows.partition_point(|window| window.layout.is_of_part());
+        let mut kept = parts;
+        while all > most && kept > 0 {
+            kept -= 1;
+            all -= bytes(&self.windows[kept]);
+        }
+        if kept < parts {
+            self.windows = [&self.windows[..kept], &self.windows[parts..]].concat().into();
+        }
+        (parts - kept) as u64
+    }
+
+    /// The windows, with their functions: those of parts first.
     pub fn windows(&self) -> &[Window] {
         &self.windows
     }
@@ -162,7 +256,8 @@ impl PreparedPdsm<'_> {
     fn update_moving(&mut self) -> Report {
         let mut report = Report::default();
         let pdsm = Pdsm::new(self.params);
-        (self.moving, _) = pdsm.windows(self.scene, &self.light, |object| object.flags.dynamic, &mut report);
+        (self.moving, _) =
+            pdsm.windows(self.scene, &self.light, None, |object| object.flags.dynamic, &mut report);
         report.bytes = self.bytes();
         report
     }

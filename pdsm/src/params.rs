@@ -38,6 +38,9 @@ pub struct PdsmParams {
     pub map_size: u32,
     /// Pixels a side of the PDSM. What is between its pixels is interpolated.
     pub pdsm_size: u32,
+    /// Parts of what the camera sees, by distance, that may have a window of their own beside the scene's: each takes all maps
+    /// again, where they make texels at least half as long. 0 makes one PDSM for any camera, as presets do.
+    pub cascades: u32,
     /// How far the compressed V may be from that of the maps; below 1/(2·`views`) compression saves little.
     pub max_error: f32,
     /// What `max_error` is measured by: V, or a picture's values, which show errors in the dark most
@@ -67,6 +70,7 @@ impl PdsmParams {
             views,
             map_size: size,
             pdsm_size: size,
+            cascades: 0,
             max_error,
             error_measure: ErrorMeasure::Visibility,
             segments: Segments::Greedy,
@@ -89,7 +93,7 @@ impl PdsmParams {
 
 impl Default for PdsmParams {
     fn default() -> Self {
-        Self::with(64, 512, 0.01)
+        Self { cascades: 3, ..Self::with(64, 512, 0.01) }
     }
 }
 
@@ -114,6 +118,12 @@ impl Params for PdsmParams {
             kind: SettingKind::Int { min: 1, max: 4096 },
             unit: "pixels a side",
             doc: "resolution of the PDSM",
+        },
+        Setting {
+            name: "cascades",
+            kind: SettingKind::Int { min: 0, max: 4 },
+            unit: "windows",
+            doc: "windows fitted to what the camera sees, where they are finer; 0 builds for any camera",
         },
         Setting {
             name: "max_error",

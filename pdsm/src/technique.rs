@@ -33,7 +33,7 @@ impl ShadowTechnique for Pdsm {
         &self,
         query: &ShadowQuery<'a>,
     ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError> {
-        let (prepared, report) = Pdsm::prepare(self, query.scene, query.light);
+        let (prepared, report) = self.prepare_for(query.scene, query.light, Some(query.camera));
         Ok((Box::new(prepared), report))
     }
 
@@ -68,7 +68,7 @@ impl GpuShadowTechnique for PdsmOnGpu {
     }
 
     fn survives_camera(&self) -> bool {
-        true
+        PdsmOnGpu::survives_camera(self)
     }
 }
 
@@ -91,7 +91,7 @@ impl PreparedShadow for PreparedPdsm<'_> {
     }
 
     fn survives_camera(&self) -> bool {
-        true
+        PreparedPdsm::survives_camera(self)
     }
 }
 

@@ -36,7 +36,7 @@ fn a_file_gives_the_image_it_was_baked_from() {
         let light = &setup.lights[0];
         for precision in [Precision::Full, Precision::Half] {
             for only_surfaces in [false, true] {
-                let params = PdsmParams { precision, only_surfaces, ..params(64) };
+                let params = PdsmParams { precision, only_surfaces, cascades: 0, ..params(64) };
                 let (built, _) = Pdsm::new(params).prepare(&setup.scene, light);
                 let (baked, _) = Pdsm::new(params).bake(&setup.scene, light);
                 baked.write(&path).expect("written");

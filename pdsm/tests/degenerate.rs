@@ -22,6 +22,7 @@ const PARAMS: PdsmParams = PdsmParams {
     views: 4,
     map_size: 30,
     pdsm_size: 16,
+    cascades: 3,
     max_error: 0.01,
     error_measure: ErrorMeasure::Visibility,
     segments: Segments::Greedy,
@@ -66,7 +67,7 @@ fn scenes_without_area_are_answered() {
             triangle([x * 1e-30, Vec3::Z * 1e-30, -x * 1e-30]),
         ] {
             let gbuffer = raster::render_gbuffer(&scene, &CAMERA);
-            let (pdsm, _) = Pdsm::new(PARAMS).prepare(&scene, light);
+            let (pdsm, _) = Pdsm::new(PARAMS).prepare_for(&scene, light, Some(&CAMERA));
             let mut visibility = VisibilityImage::new(CAMERA.width, CAMERA.height);
             pdsm.shade(&gbuffer, &mut visibility);
             for (pixel, &v) in visibility.values.iter().enumerate() {

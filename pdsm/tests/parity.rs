@@ -21,6 +21,7 @@ const PARAMS: PdsmParams = PdsmParams {
     views: 16,
     map_size: 128,
     pdsm_size: 128,
+    cascades: 3,
     max_error: 0.02,
     error_measure: ErrorMeasure::Visibility,
     segments: Segments::Greedy,
@@ -40,7 +41,7 @@ struct Case<'a> {
 }
 
 fn on_cpu(params: PdsmParams, case: &Case<'_>, gbuffers: &[GBuffer]) -> Vec<VisibilityImage> {
-    let (pdsm, _) = Pdsm::new(params).prepare(case.scene, &case.light);
+    let (pdsm, _) = Pdsm::new(params).prepare_for(case.scene, &case.light, Some(case.camera));
     let shade = |gbuffer: &GBuffer| {
         let mut image = VisibilityImage::new(gbuffer.width, gbuffer.height);
         pdsm.shade(gbuffer, &mut image);

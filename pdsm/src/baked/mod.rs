@@ -127,12 +127,14 @@ pub struct Baked {
 }
 
 impl Pdsm {
-    /// Builds the PDSM of `light` over the casters that are not dynamic.
+    /// Builds the PDSM of `light` over the casters that are not dynamic, for any camera: without `cascades`.
     pub fn bake(&self, scene: &Scene, light: &Light) -> (Baked, Report) {
         let mut report = Report::default();
-        let (windows, tolerance) = self.windows(scene, light, |object| !object.flags.dynamic, &mut report);
+        let any_camera = self.for_any_camera();
+        let (windows, tolerance) =
+            any_camera.windows(scene, light, None, |object| !object.flags.dynamic, &mut report);
         let fingerprint = Fingerprint::new(scene);
-        (Baked { params: self.params, light: *light, tolerance, fingerprint, windows }, report)
+        (Baked { params: any_camera.params, light: *light, tolerance, fingerprint, windows }, report)
     }
 }
 

@@ -33,6 +33,8 @@ pub(super) fn write(baked: &Baked, to: &mut Writer) {
         only_surfaces,
         skip,
         seed,
+        // A file is for any camera.
+        cascades: _,
     } = baked.params;
     for value in [views, map_size, pdsm_size, filter_radius] {
         to.u32(value);
@@ -79,6 +81,7 @@ pub(super) fn read(from: &mut Reader<'_>) -> Option<Baked> {
         only_surfaces,
         skip,
         seed,
+        cascades: 0,
     };
     let light = read_light(from)?;
     let [tolerance] = from.finite()?;
@@ -210,6 +213,7 @@ fn read_window(from: &mut Reader<'_>) -> Option<Window> {
         caster_range,
         offsets,
         reach,
+        part: None,
     };
     Some(Window { layout, grid, functions })
 }

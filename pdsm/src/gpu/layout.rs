@@ -2,16 +2,20 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
+use scene_core::geometry::Aabb;
 
 use crate::cpu::Window;
-use crate::layout::Depth;
+use crate::layout::{Depth, Held};
 use crate::nodes::{DepthSteps, Nodes};
 
-/// Most windows of one light: the faces of a cube, and as many over casters that move.
+/// Most windows of one light: the faces of a cube, and as many over casters that move or of parts of what is seen.
 pub const MOST_WINDOWS: usize = 12;
 
 /// What stands for an infinite tangent: shaders need not know infinities, and no point is seen at it.
 const ANY_TAN: f32 = 1e30;
+
+/// What stands for an infinite coordinate.
+const ANYWHERE: f32 = 3e38;
 
 /// `Window` of `functions.wesl`.
 #[repr(C)]
@@ -57,6 +61,18 @@ pub struct WindowUniform {
     pub t_error: f32,
     /// Zero.
     pub padding: [u32; 2],
+    /// Lower corner of the world-space box that points of this window lie in.
+    pub low: Vec3,
+    /// Zero.
+    pub padding_low: f32,
+    /// Its upper corner.
+    pub high: Vec3,
+    /// Zero.
+    pub padding_high: f32,
+    /// Where their rays lie on the window, in texels: from.
+    pub first_texel: Vec2,
+    /// And to.
+    pub last_texel: Vec2,
 }
 
 impl WindowUniform {
@@ -73,6 +89,11 @@ impl WindowUniform {
             Nodes::Full(_) => DepthSteps { start: 0.0, step: 0.0 },
             Nodes::Packed(_, steps) => *steps,
         };
+        let everywhere = Held {
+            bounds: Aabb { min: Vec3::splat(-ANYWHERE), max: Vec3::splat(ANYWHERE) },
+            texels: [Vec2::splat(-ANYWHERE), Vec2::splat(ANYWHERE)],
+        };
+        let Held { bounds, texels: [first_texel, last_texel] } = layout.part.unwrap_or(everywhere);
         Self {
             origin: layout.origin,
             size: window.grid.size,
@@ -94,6 +115,12 @@ impl WindowUniform {
             first_word,
             t_error: window.functions.nodes().depth_error(),
             padding: [0; 2],
+            low: bounds.min,
+            padding_low: 0.0,
+            high: bounds.max,
+            padding_high: 0.0,
+            first_texel,
+            last_texel,
         }
     }
 }
@@ -146,7 +173,11 @@ mod tests {
                 t_start,
                 t_step,
                 first_word,
-                t_error
+                t_error,
+                low,
+                high,
+                first_texel,
+                last_texel
             ]
         );
         assert_layout!(PdsmUniform, SHADE, "Pdsm", [windows, count, still, tolerance, radius]);

@@ -9,7 +9,7 @@ pub mod shaders;
 
 use scene_core::gpu::{
     GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings,
-    SceneGroups, VisibilityPass, VisibilityPassParts, binding, storage_buffer,
+    SceneGroups, VisibilityPass, VisibilityPassParts, binding, binding_limit, storage_buffer,
 };
 use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Report};
@@ -43,6 +43,7 @@ struct Prepared {
     own: wgpu::BindGroup,
     scene: SceneGroups,
     bytes: u64,
+    survives_camera: bool,
 }
 
 impl PdsmOnGpu {
@@ -78,7 +79,8 @@ impl PdsmOnGpu {
     }
 
     /// Builds the PDSM of the query's light on the CPU, or takes the baked one, and copies it to the device. It holds for
-    /// any camera.
+    /// any camera, but for windows of what the query's camera sees. Of those the farthest are left out where the device does
+    /// not bind the functions of all in one piece: their surfaces are answered by the scene's own window.
     ///
     /// # Errors
     /// A light or a scene that functions were not baked for; a scene without [`GpuScene::geometry`](scene_core::gpu::GpuScene::geometry); more functions than the device binds
@@ -94,10 +96,12 @@ impl PdsmOnGpu {
             input: "a scene on the GPU alone".to_owned(),
             why: "its maps are drawn on the CPU: hand over the geometry in memory, too".to_owned(),
         })?;
-        let (pdsm, mut report) = match &self.source {
-            Source::Built(technique) => technique.prepare(geometry, query.light),
+        let (mut pdsm, mut report) = match &self.source {
+            Source::Built(technique) => technique.prepare_for(geometry, query.light, Some(query.camera)),
             Source::Baked(baked) => baked.prepare(geometry, query.light).map_err(baked::refused)?,
         };
+        let most = binding_limit(recorder.device);
+        report.skip("windows beyond the device's memory", pdsm.leave_out_parts(most));
         report.time("prepare.upload", |_| self.upload(recorder.device, query, &pdsm))?;
         Ok(report)
     }
@@ -136,9 +140,15 @@ impl PdsmOnGpu {
         let uniform = self.uniform.get(device, bytemuck::bytes_of(&uniform));
         let bound = [uniform.into(), index.into(), nodes.into(), offsets.into()];
         let own = self.own.get(device, &bound);
-        self.prepared = Some(Prepared { own, scene: self.scene.groups(device, &query.scene), bytes });
+        let (scene, survives_camera) = (self.scene.groups(device, &query.scene), pdsm.survives_camera());
+        self.prepared = Some(Prepared { own, scene, bytes, survives_camera });
         self.receivers.prepare(device, query);
         Ok(())
+    }
+
+    /// Whether what was prepared last would be the same for any other camera.
+    pub fn survives_camera(&self) -> bool {
+        self.prepared.as_ref().is_none_or(|prepared| prepared.survives_camera)
     }
 
     /// `shade.lookup`: records the pass that writes V of every pixel, 1 where nothing is seen.

@@ -1,12 +1,14 @@
 //! Fitting windows to a scene: which there are, how much of their planes they hold, and the samples of the light.
 
-use glam::{DMat3, DVec2, DVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
 use scene_core::geometry::{Aabb, Object};
 use scene_core::light::LightPoint;
 use scene_core::light::sampling::{LightView, SampleKey, stratified};
 use scene_core::{Light, Scene};
 
-use super::{Depth, Layout};
+use super::cone::Cone;
+use super::view::Part;
+use super::{Depth, Held, Layout};
 
 /// Tangent of the half angle beyond which a window sees nothing: rays within 3.6° of a flat light's own plane. Wider
 /// windows would have no texel left for what matters.
@@ -27,6 +29,13 @@ const NEAR_SHARE: f64 = 1.0 / 1024.0;
 /// The window stands at this share of the farthest distance at least. A step of f32 in t is one of z²/F in z: nearer, far
 /// points would lose more than two bits.
 const FOCUS_SHARE: f64 = 0.25;
+
+/// Texels around what a window must hold, where it is cut to what its light reaches: lookups interpolate from there, too.
+const RIM: u32 = 4;
+
+/// Ways that a window is turned about the light's, in which the smallest is looked for.
+const TURNS: u32 = 16;
+
 /// The windows of `light` over `casters`, with `views` stratified samples each, maps of `map_size` texels a side.
 /// Windows without casters are left out; `skipped` counts them. A light without extent has one sample.
 pub fn layouts(
@@ -43,11 +52,66 @@ pub fn layouts(
     }
     let frames = frames(light, bounds);
     let tried = frames.len() as u64;
-    let build =
-        Builder { scene, casters, light, views: if light.is_extended() { views } else { 1 }, map_size, seed };
-    let layouts: Vec<_> = frames.into_iter().filter_map(|frame| build.layout(frame)).collect();
+    let build = Builder::new(scene, casters, light, views, map_size, seed);
+    let receivers = build.vertices(scene.objects().iter().filter(|object| object.flags.receives));
+    let layouts: Vec<_> = frames
+        .into_iter()
+        .filter_map(|frame| build.layout(frame, &Asked { points: &receivers, corners: &receivers, rim: RIM }))
+        .collect();
     let skipped = tried - layouts.len() as u64;
     (layouts, skipped)
+}
+
+/// The window of `light` over `casters` for the receivers of `part` alone, with all texels where those are. `None` if no
+/// caster is in their way or one window cannot look at all of them.
+pub fn layout_of_part(
+    scene: &Scene,
+    casters: &[&Object],
+    light: &Light,
+    views: u32,
+    map_size: u32,
+    seed: u64,
+    part: &Part,
+) -> Option<Layout> {
+    let corners = part.bounds.corners();
+    let build = Builder::new(scene, casters, light, views, map_size, seed);
+    let frame = frame_towards(light, part.bounds)?;
+    let mut layout =
+        build.layout(frame, &Asked { points: &part.points, corners: &corners, rim: part.rim.max(RIM) })?;
+    // What lies between the points that were looked at belongs to the part, too, but no texel of the rim does.
+    let texels = part.points.iter().filter_map(|&point| layout.project(point)).map(|at| at.texel);
+    let [low, high] = texels
+        .fold([Vec2::INFINITY, Vec2::NEG_INFINITY], |[low, high], texel| [low.min(texel), high.max(texel)]);
+    let rim = Vec2::splat(part.rim as f32);
+    let last = Vec2::splat(map_size as f32) - rim;
+    let between = (high - low) * Part::BETWEEN;
+    layout.part =
+        Some(Held { bounds: part.bounds, texels: [(low - between).max(rim), (high + between).min(last)] });
+    Some(layout)
+}
+
+/// What a window is fitted to: positions whose rays it must hold, the corners of a region that all of them lie in, and
+/// texels around them.
+struct Asked<'a> {
+    points: &'a [Vec3],
+    corners: &'a [Vec3],
+    rim: u32,
+}
+
+/// Axes that look at all of `bounds`; `None` if no window can.
+fn frame_towards(light: &Light, bounds: Aabb) -> Option<Frame> {
+    let middle = bounds.center().as_dvec3();
+    match *light {
+        Light::Directional { .. } => frames(light, bounds).pop(),
+        Light::Rect { .. } | Light::Disk { .. } => {
+            frames(light, bounds).into_iter().find(|frame| frame.local(bounds.center()).z > 0.0)
+        }
+        Light::Spot { position, .. } | Light::Point { position } | Light::Sphere { center: position, .. } => {
+            let to_middle = middle - position.as_dvec3();
+            let is_ahead = to_middle.length() * 3f64.sqrt() * 0.5 > 0.5 * f64::from(bounds.diagonal());
+            is_ahead.then(|| Frame::new(position.as_dvec3(), to_middle, false, f64::INFINITY))
+        }
+    }
 }
 
 /// Axes of a window before it is fitted.
@@ -104,8 +168,9 @@ fn frames(light: &Light, casters: Aabb) -> Vec<Frame> {
 }
 
 struct Builder<'a> {
+    /// Of all casters.
+    vertices: Vec<Vec3>,
     scene: &'a Scene,
-    casters: &'a [&'a Object],
     light: &'a Light,
     views: u32,
     map_size: u32,
@@ -127,23 +192,35 @@ impl Rect {
     }
 }
 
-impl Builder<'_> {
-    fn layout(&self, frame: Frame) -> Option<Layout> {
-        let vertices = |objects: &[&Object]| {
-            objects
-                .iter()
-                .flat_map(|o| &self.scene.positions()[o.vertices.clone()])
-                .map(|&p| frame.local(p))
-                .collect::<Vec<_>>()
-        };
-        let casters = vertices(self.casters);
-        let receivers: Vec<_> = self.scene.objects().iter().filter(|o| o.flags.receives).collect();
-        let receivers = vertices(&receivers);
+impl<'a> Builder<'a> {
+    fn new(
+        scene: &'a Scene,
+        casters: &[&Object],
+        light: &'a Light,
+        views: u32,
+        map_size: u32,
+        seed: u64,
+    ) -> Self {
+        let views = if light.is_extended() { views } else { 1 };
+        let mut build = Self { vertices: Vec::new(), scene, light, views, map_size, seed };
+        build.vertices = build.vertices(casters.iter().copied());
+        build
+    }
+
+    fn vertices<'o>(&self, objects: impl Iterator<Item = &'o Object>) -> Vec<Vec3> {
+        objects.flat_map(|o| &self.scene.positions()[o.vertices.clone()]).copied().collect()
+    }
+
+    fn layout(&self, frame: Frame, asked: &Asked<'_>) -> Option<Layout> {
+        let local =
+            |frame: &Frame, points: &[Vec3]| points.iter().map(|&p| frame.local(p)).collect::<Vec<_>>();
+        let (casters, receivers) = (local(&frame, &self.vertices), local(&frame, asked.points));
+        let corners = local(&frame, asked.corners);
         let extent = |points: &[DVec3]| {
             points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], p| [a.min(p.z), b.max(p.z)])
         };
         let [near, far] = extent(&casters);
-        let [_, far_receiver] = extent(&receivers);
+        let [_, far_receiver] = extent(&corners);
         let farthest = far.max(far_receiver);
         let (near, focus) = if frame.is_parallel {
             let pad = (far - near).max(farthest.abs().max(near.abs()) * SMALLEST_SHARE) * MARGIN;
@@ -159,8 +236,31 @@ impl Builder<'_> {
         let far = if frame.is_parallel { far + (far - near) * MARGIN } else { far };
         let per_unit = if frame.is_parallel { 2.0 / (farthest - near) } else { 0.0 };
         let offsets = self.offsets(&frame, 0.5 * (near + far));
-        let reach = offsets.iter().fold(Rect::EMPTY, |sum, &a| sum.with(a, [DVec2::ZERO; 2]));
-        let window = window(&frame, &casters, &receivers, focus, near, farthest, reach)?;
+        let around =
+            |offsets: &[DVec2]| offsets.iter().fold(Rect::EMPTY, |sum, &a| sum.with(a, [DVec2::ZERO; 2]));
+        let rim = f64::from(asked.rim) / f64::from(self.map_size.max(1));
+        let cone = match *self.light {
+            Light::Spot { direction, outer, .. } => {
+                Some(Cone { axis: direction.as_dvec3().normalize_or_zero(), angle: f64::from(outer) })
+            }
+            _ => None,
+        };
+        let at = |turn: Turn| {
+            let turned = |points: &[DVec3]| points.iter().map(|&p| turn.of(p)).collect::<Vec<_>>();
+            let reach = around(&offsets.iter().map(|&a| turn.of_plane(a)).collect::<Vec<_>>());
+            let frame = turn.of_frame(frame);
+            let range = DepthRange { focus, near, farthest };
+            let window =
+                window(&frame, &turned(&casters), &turned(&receivers), &range, reach, cone.as_ref(), rim)?;
+            Some((frame, turn, reach, window))
+        };
+        // The faces of a cube must stay what they are.
+        let turns = if frame.max_tan.is_finite() { 1 } else { TURNS };
+        let area = |window: &Rect| (window.max - window.min).max(DVec2::ZERO).element_product();
+        let (frame, turn, reach, window) = (0..turns)
+            .filter_map(|turn| at(Turn::new(turn)))
+            .min_by(|a, b| area(&a.3).total_cmp(&area(&b.3)))?;
+        let offsets: Vec<_> = offsets.into_iter().map(|a| turn.of_plane(a)).collect();
         let size = (window.max - window.min)
             .max(DVec2::splat(window.max.abs().max(window.min.abs()).max_element() * SMALLEST_SHARE))
             .max(DVec2::splat(1e-30));
@@ -182,6 +282,7 @@ impl Builder<'_> {
             caster_range: [near, far],
             offsets: offsets.iter().map(|a| a.as_vec2()).collect(),
             reach: reach.max.max(-reach.min).as_vec2(),
+            part: None,
         };
         let is_finite = layout.corner.is_finite()
             && layout.texels_per_unit.is_finite()
@@ -217,17 +318,55 @@ impl Builder<'_> {
     }
 }
 
-/// The part of the window's plane that must be held: the casters as every sample sees them, and the rays of all points
-/// that their shadows can reach. `None` if there is nothing.
+/// A rotation of a window about the way of its light, by a share of a quarter turn.
+#[derive(Clone, Copy)]
+struct Turn {
+    sin: f64,
+    cos: f64,
+}
+
+impl Turn {
+    fn new(number: u32) -> Self {
+        let (sin, cos) = (f64::from(number) / f64::from(TURNS) * std::f64::consts::FRAC_PI_2).sin_cos();
+        Self { sin, cos }
+    }
+
+    /// Coordinates in the turned axes.
+    fn of_plane(self, p: DVec2) -> DVec2 {
+        DVec2::new(self.cos * p.x + self.sin * p.y, self.cos * p.y - self.sin * p.x)
+    }
+
+    fn of(self, p: DVec3) -> DVec3 {
+        self.of_plane(p.truncate()).extend(p.z)
+    }
+
+    fn of_frame(self, frame: Frame) -> Frame {
+        let DMat3 { x_axis: x, y_axis: y, z_axis } = frame.axes;
+        let axes = DMat3::from_cols(x * self.cos + y * self.sin, y * self.cos - x * self.sin, z_axis);
+        Frame { axes, ..frame }
+    }
+}
+
+/// Distances along the way of the light: of the window, of the nearest caster and of the farthest point.
+struct DepthRange {
+    focus: f64,
+    near: f64,
+    farthest: f64,
+}
+
+/// The part of the window's plane that must be held: the rays of all `receivers` that a shadow can reach, and what all
+/// samples see of the casters on them. `rim` is a share of its extent for what lookups reach around. `None` if there is
+/// nothing.
 fn window(
     frame: &Frame,
     casters: &[DVec3],
     receivers: &[DVec3],
-    focus: f64,
-    near: f64,
-    farthest: f64,
+    range: &DepthRange,
     offsets: Rect,
+    cone: Option<&Cone>,
+    rim: f64,
 ) -> Option<Rect> {
+    let DepthRange { focus, near, farthest } = *range;
     // Position on the window, and by how much offsets are multiplied there.
     let project = |p: &DVec3| {
         if frame.is_parallel {
@@ -247,20 +386,32 @@ fn window(
         let (q, factor) = project(p);
         maps = maps.with(q, spread(factor, 1.0));
     }
-    if maps.min.x > maps.max.x {
-        return None;
-    }
-    let at = |z: f64| if frame.is_parallel { focus - z } else { 1.0 - focus / z.max(near) };
-    // A ray at q is in the map at q + a·factor; the shadow's rays are the maps' rectangle, less that.
-    let mut rays = maps;
-    for z in [near, farthest] {
-        let [low, high] = spread(at(z), -1.0);
-        rays = Rect { min: rays.min.min(maps.min + low), max: rays.max.max(maps.max + high) };
-    }
     let mut seen = Rect::EMPTY;
     for p in receivers.iter().filter(in_front) {
         seen = seen.with(project(p).0, [DVec2::ZERO; 2]);
     }
+    if let Some(cone) = cone {
+        let [low, high] = cone.tangents(frame.axes);
+        seen = Rect { min: seen.min.max(low * focus), max: seen.max.min(high * focus) };
+    }
+    let around = (seen.max - seen.min) * rim;
+    seen = Rect { min: seen.min - around, max: seen.max + around };
+    let at = |z: f64| if frame.is_parallel { focus - z } else { 1.0 - focus / z.max(near) };
+    // A ray at q is in the map at q + a·factor; the shadow's rays are the maps' rectangle, less that.
+    let mut rays = maps;
+    // Where the rays that are asked for meet the maps.
+    let mut met = seen;
+    for z in [near, farthest] {
+        let [low, high] = spread(at(z), -1.0);
+        rays = Rect { min: rays.min.min(maps.min + low), max: rays.max.max(maps.max + high) };
+        let [low, high] = spread(at(z), 1.0);
+        met = Rect { min: met.min.min(seen.min + low), max: met.max.max(seen.max + high) };
+    }
     let rays = Rect { min: rays.min.max(seen.min), max: rays.max.min(seen.max) };
+    let maps = Rect { min: maps.min.max(met.min), max: maps.max.min(met.max) };
+    let is_there = |rect: &Rect| rect.min.cmple(rect.max).all();
+    if !is_there(&rays) || !is_there(&maps) {
+        return None;
+    }
     Some(Rect { min: maps.min.min(rays.min), max: maps.max.max(rays.max) })
 }

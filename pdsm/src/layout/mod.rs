@@ -7,14 +7,21 @@
 //! is perpendicular to the middle direction n, it is q − a·(z − F): **t = (z − F)/r** for any unit r. In both, depth
 //! is t in every map and in the PDSM, planes stay planes, and a ray is q + D·t in the map of the sample with step D.
 //!
+//! A window spans what of the casters can shadow receivers, and is turned about the way of its light so that its area is
+//! least. Parts of what a camera sees have windows of their own ([`parts`]).
+//!
 //! So rect and disk lights and the sun are exact. A sphere is taken for the disk that the middle of the casters sees
 //! as large; from inside the casters' bounds six windows stand around it as the faces of a cube.
 
+mod cone;
 mod fit;
+mod view;
 
 use glam::{DVec3, Mat4, Vec2, Vec3, Vec4};
+use scene_core::geometry::Aabb;
 
-pub use fit::layouts;
+pub use fit::{layout_of_part, layouts};
+pub use view::{Part, parts};
 
 /// How distance becomes t.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,6 +54,17 @@ pub struct Layout {
     pub(crate) offsets: Vec<Vec2>,
     /// The largest offset along each axis.
     pub(crate) reach: Vec2,
+    /// What belongs here, if that is but a part of the scene.
+    pub(crate) part: Option<Held>,
+}
+
+/// What a window holds that is fitted to a part of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Held {
+    /// Where points lie, world space.
+    pub(crate) bounds: Aabb,
+    /// Where their rays lie on the window, in texels: from, to.
+    pub(crate) texels: [Vec2; 2],
 }
 
 /// A point as a layout has it.
@@ -92,7 +110,27 @@ impl Layout {
         let farthest = self.max_tan * local.z;
         let belongs = matches!(self.depth, Depth::Parallel { .. })
             || (local.x.abs() <= farthest && local.y.abs() <= farthest);
-        if belongs { self.project_local(local) } else { None }
+        let Some(Held { bounds, texels: [low, high] }) = self.part else {
+            return if belongs { self.project_local(local) } else { None };
+        };
+        if !belongs || !(bounds.min.cmple(point) & bounds.max.cmpge(point)).all() {
+            return None;
+        }
+        self.project_local(local).filter(|at| (low.cmple(at.texel) & high.cmpge(at.texel)).all())
+    }
+
+    /// Whether it is fitted to a part of a scene.
+    pub fn is_of_part(&self) -> bool {
+        self.part.is_some()
+    }
+
+    /// How large a texel is where the ray through it passes `point`, as an area across the window's axis.
+    pub fn texel_area(&self, point: Vec3) -> f32 {
+        let on_window = (self.texels_per_unit.x * self.texels_per_unit.y).recip();
+        match self.depth {
+            Depth::Central { focus } => on_window * (self.local(point).z / focus).powi(2),
+            Depth::Parallel { .. } => on_window,
+        }
     }
 
     /// Where `point` lies, also if another window looks at it; `None` on and behind the light's plane.
