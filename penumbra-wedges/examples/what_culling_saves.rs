@@ -1,6 +1,6 @@
 //! What leaving wedges out saves, and from how many edges on it is cheaper to trace a tile's samples than to count.
 //!
-//! `cargo run --release -p gnomon-penumbra-wedges --example what_culling_saves`
+//! `cargo run --release -p gnomon-penumbra-wedges --example what_culling_saves [culling | rays] [SCENE WIDTHxHEIGHT]...`
 
 use std::error::Error;
 use std::time::Instant;
@@ -13,29 +13,31 @@ use gnomon_penumbra_wedges::{Casters, PenumbraWedges, PreparedWedges, Variant, W
 use scene_core::{GBuffer, SceneSetup, VisibilityImage, raster, scenes};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let what = std::env::args().nth(1);
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let what = arguments.first();
     let all = what.is_none();
-    if all || what.as_deref() == Some("culling") {
-        culling()?;
+    if all || what.is_some_and(|what| what == "culling") {
+        culling(arguments.get(1..).unwrap_or_default())?;
     }
-    if all || what.as_deref() == Some("rays") {
+    if all || what.is_some_and(|what| what == "rays") {
         rays()?;
     }
     Ok(())
 }
 
 /// Shading with wedges left out for strips, runs, tiles and pixels, and with all of them asked by every pixel.
-fn culling() -> Result<(), Box<dyn Error>> {
+fn culling(stations: &[String]) -> Result<(), Box<dyn Error>> {
     println!("| scene | edges | variant | all wedges, ms | culled, ms | pays | µs a penumbra pixel |");
     println!("| --- | --- | --- | --- | --- | --- | --- |");
-    // All wedges of a park, asked by every pixel, take minutes with the slowest variant.
-    for (spec, size) in [("log-cabin", [192, 192]), ("park", [192, 192])] {
+    let usual = ["log-cabin", "192x192", "park", "192x192"].map(str::to_owned);
+    for station in (if stations.is_empty() { &usual[..] } else { stations }).chunks_exact(2) {
+        let (spec, size) = (&station[0], station[1].split_once('x').ok_or("a size is WIDTHxHEIGHT")?);
+        let size = [size.0.parse()?, size.1.parse()?];
         let setup = scenes::build(spec, 0.0)?;
         let camera = setup.camera.with_size(size[0], size[1]);
         let gbuffer = raster::render_gbuffer(&setup.scene, &camera);
         let casters = Casters::new(&setup.scene)?;
-        let variants = [Variant::Coverage, Variant::Exact, Variant::Interpolated];
-        for &variant in &variants[..if spec == "park" { 2 } else { 3 }] {
+        for variant in [Variant::Interpolated, Variant::Coverage, Variant::Exact] {
             let mut took = Vec::new();
             let mut images = Vec::new();
             let (mut edges, mut each) = (0, 0.0);
