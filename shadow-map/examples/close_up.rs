@@ -1,7 +1,7 @@
 //! What leaving out saves where a camera looks at a small part of a large scene: `prepare` and `shade` with and without
 //! `skip`, and that every pixel is the same.
 //!
-//! `cargo run --release --example close_up -- [RUNS] [SCENE]`: a forest of a million triangles, seen from a step away:
+//! `cargo run --release --example close_up -- [RUNS] [SCENE] [VARIANT]`: a forest of a million triangles, seen from a step away:
 //! a patch of its ground, a metre or so across. The bounds of runs of triangles, which hold as long as the scene does, are taken once and timed
 //! apart.
 
@@ -17,6 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let runs: u32 = arguments.next().map_or(Ok(5), |count| count.parse())?;
     let spec = arguments.next().unwrap_or_else(|| "forest:triangles=1000000".to_owned());
+    let only = arguments.next();
     let setup = scenes::build(&spec, 0.0)?;
     let scene = &setup.scene;
     let camera = Camera {
@@ -55,9 +56,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         (Variant::MultiView, sun, "sun of its size"),
         (Variant::AliasFree, sharp, "sun"),
     ] {
+        if only.as_ref().is_some_and(|only| only != variant.name()) {
+            continue;
+        }
         let mut images = [(); 2].map(|()| VisibilityImage::new(camera.width, camera.height));
         let mut least = [[f64::INFINITY; 2]; 2];
-        let mut left_out = String::new();
+        let (mut left_out, mut stages) = (String::new(), [const { String::new() }; 2]);
         for _ in 0..runs {
             for (at, skip) in [false, true].into_iter().enumerate() {
                 let params = ShadowMapParams { variant, skip, views: 4, ..Default::default() };
@@ -72,6 +76,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let shade = start.elapsed().as_secs_f64() * 1e3;
                 if prepare + shade < least[at][0] + least[at][1] {
                     least[at] = [prepare, shade];
+                    stages[at] = stages_of(&report);
                 }
                 left_out = skips(&report);
             }
@@ -88,8 +93,13 @@ fn main() -> Result<(), Box<dyn Error>> {
             on[1],
             (off[0] + off[1]) / (on[0] + on[1]),
         );
+        println!("  off: {}\n  on: {}", stages[0], stages[1]);
     }
     Ok(())
+}
+
+fn stages_of(report: &Report) -> String {
+    report.stages_ms.iter().map(|(stage, ms)| format!("{stage} {ms:.2}")).collect::<Vec<_>>().join(", ")
 }
 
 fn skips(report: &Report) -> String {

@@ -4,12 +4,14 @@ use std::ops::Range;
 
 use glam::Vec3;
 use rayon::prelude::*;
-use scene_core::raster::{DepthMap, DepthOptions, RasterScratch, render_depth_and_triangles_into};
+use scene_core::raster::{DepthOptions, RasterScratch, render_depth_and_triangles_into};
 use scene_core::{GBuffer, Scene, VisibilityImage};
 
-use crate::light_maps::{LightMaps, Receiver, ShadowMapView};
+use crate::light_maps::{LightMaps, Receiver, ShadowMapView, Window};
 use crate::light_views::LightView;
+use crate::patches::{Outcome, Patch, PatchRow, Questions, TILE};
 use crate::receiver_plane::view_tolerance;
+use crate::texel_outcomes::{TexelOutcomes, bits};
 
 /// `prepare.maps`: draws the casters, ranges of [`Scene::triangles`], as each view sees them.
 pub fn render_maps(
@@ -19,28 +21,28 @@ pub fn render_maps(
     size: u32,
 ) -> Vec<ShadowMapView> {
     let mut maps = Vec::new();
-    render_maps_into(scene, casters, views, size, &mut RasterScratch::new(), &mut maps);
+    render_maps_into(scene, casters, views, None, size, &mut RasterScratch::new(), &mut maps);
     maps
 }
 
-/// [`render_maps`] with casters for each view. Where there are none the map is empty, and not drawn.
+/// [`render_maps`] with casters for each view, and the texels that matter. Where there are no casters the map is empty, and
+/// not drawn.
 pub fn render_maps_of(
     scene: &Scene,
-    casters: &[Vec<Range<usize>>],
+    needs: &[(Vec<Range<usize>>, Option<Window>)],
     views: &[LightView],
     size: u32,
 ) -> Vec<ShadowMapView> {
-    let (mut scratch, texels) = (RasterScratch::new(), size as usize * size as usize);
-    let draw = |(&view, casters): (&LightView, &Vec<Range<usize>>)| {
+    let mut scratch = RasterScratch::new();
+    let draw = |(&view, (casters, window)): (&LightView, &(Vec<Range<usize>>, Option<Window>))| {
         if casters.is_empty() {
-            let map = DepthMap { width: size, height: size, depth: vec![0.0; texels] };
-            return ShadowMapView { view, map, triangles: vec![GBuffer::NOTHING; texels] };
+            return ShadowMapView::empty(view, size, window.as_ref());
         }
-        let mut drawn = Vec::new();
-        render_maps_into(scene, casters, &[view], size, &mut scratch, &mut drawn);
-        drawn.remove(0)
+        let mut map = ShadowMapView::undrawn(view);
+        render_map_into(scene, casters, view, size, window.as_ref(), &mut scratch, &mut map);
+        map
     };
-    views.iter().zip(casters).map(draw).collect()
+    views.iter().zip(needs).map(draw).collect()
 }
 
 /// [`render_maps`] into maps that are there already: what is drawn again and again allocates nothing.
@@ -48,22 +50,109 @@ pub fn render_maps_into(
     scene: &Scene,
     casters: &[Range<usize>],
     views: &[LightView],
+    windows: Option<&[Window]>,
     size: u32,
     scratch: &mut RasterScratch,
     maps: &mut Vec<ShadowMapView>,
 ) {
-    let options = DepthOptions { triangles: Some(casters), ..Default::default() };
     maps.truncate(views.len());
     for (index, &view) in views.iter().enumerate() {
         if index == maps.len() {
-            maps.push(ShadowMapView { view, map: DepthMap::default(), triangles: Vec::new() });
+            maps.push(ShadowMapView::undrawn(view));
         }
-        let ShadowMapView { view: of, map, triangles } = &mut maps[index];
-        *of = view;
-        (map.width, map.height) = (size, size);
-        let projection = view.projection_from_world;
-        render_depth_and_triangles_into(scene, projection, &options, scratch, map, triangles);
+        let window = windows.and_then(|windows| windows.get(index));
+        render_map_into(scene, casters, view, size, window, scratch, &mut maps[index]);
     }
+}
+
+/// One map, or of one the texels that matter.
+fn render_map_into(
+    scene: &Scene,
+    casters: &[Range<usize>],
+    view: LightView,
+    size: u32,
+    window: Option<&Window>,
+    scratch: &mut RasterScratch,
+    target: &mut ShadowMapView,
+) {
+    let ShadowMapView { view: of, map, triangles, window: drawn } = target;
+    *of = view;
+    *drawn = window.cloned().unwrap_or([0..size, 0..size]);
+    (map.width, map.height) = (size, size);
+    let options = DepthOptions { triangles: Some(casters), window, ..Default::default() };
+    render_depth_and_triangles_into(scene, view.projection_from_world, &options, scratch, map, triangles);
+}
+
+/// V of every pixel that sees a surface, NaN elsewhere, with the pixels of each patch asked together. `fill` says what the
+/// texels are to a patch, `constant` the V of pixels for which all texels are alike, if that is one V, and `known` V at a point of the
+/// patch, if that takes texels alone of which it is known what they are. Others are given to `answer`, which counts what took no filter.
+/// Returns how many those are, and how many pixels were not given to it.
+#[expect(clippy::too_many_arguments, reason = "what is read, what is written, and four questions")]
+pub fn shade_patches(
+    maps: &LightMaps<'_>,
+    gbuffer: &GBuffer,
+    patches: &[PatchRow],
+    values: &mut [f32],
+    fill: impl Fn(&Patch, &mut Questions, &mut TexelOutcomes) -> bool + Sync,
+    constant: impl Fn(Outcome) -> Option<f32> + Sync,
+    known: impl Fn(&TexelOutcomes, Vec3, [u32; 2]) -> Option<f32> + Sync,
+    answer: impl Fn(Option<&TexelOutcomes>, &Receiver, &mut u64) -> f32 + Sync,
+) -> [u64; 2] {
+    let width = gbuffer.width.max(1) as usize;
+    let shade_row = |(tile_row, values): (usize, &mut [f32])| {
+        let (mut outcomes, mut counts) = (TexelOutcomes::default(), [0; 2]);
+        let rows = values.len() / width;
+        for (tile, x) in (0..width).step_by(TILE).enumerate() {
+            let columns = TILE.min(width - x);
+            let line = u64::MAX >> (64 - columns);
+            let whole = (0..rows).fold(0, |bits, row| bits | line << (row * TILE));
+            let mut rest: u64 = whole;
+            for patch in patches[tile_row].of(tile) {
+                let Some(mut questions) = Questions::new(patch, &maps.light, maps.tolerance) else {
+                    continue;
+                };
+                if !fill(patch, &mut questions, &mut outcomes) {
+                    continue;
+                }
+                rest &= !patch.mask;
+                if let Some(v) = outcomes.all().and_then(&constant) {
+                    counts[1] += u64::from(patch.mask.count_ones());
+                    if patch.mask == whole {
+                        values.chunks_mut(width).for_each(|line| line[x..x + columns].fill(v));
+                    } else {
+                        bits(patch.mask.into())
+                            .for_each(|bit| values[bit / TILE * width + x + bit % TILE] = v);
+                    }
+                    continue;
+                }
+                for bit in bits(patch.mask.into()) {
+                    let (row, column) = (bit / TILE, x + bit % TILE);
+                    let pixel = (tile_row * TILE + row) * width + column;
+                    let at = [column as u32, (tile_row * TILE + row) as u32];
+                    let v = known(&outcomes, gbuffer.position[pixel], at);
+                    counts[1] += u64::from(v.is_some());
+                    values[row * width + column] = match v {
+                        Some(v) => v,
+                        None => match receiver(maps, gbuffer, pixel) {
+                            Ok(receiver) => answer(Some(&outcomes), &receiver, &mut counts[0]),
+                            Err(known) => known,
+                        },
+                    };
+                }
+            }
+            for bit in bits(rest.into()) {
+                let (row, column) = (bit / TILE, x + bit % TILE);
+                values[row * width + column] =
+                    match receiver(maps, gbuffer, (tile_row * TILE + row) * width + column) {
+                        Ok(receiver) => answer(None, &receiver, &mut counts[0]),
+                        Err(known) => known,
+                    };
+            }
+        }
+        counts
+    };
+    let rows = values.par_chunks_mut(width * TILE).enumerate().map(shade_row);
+    rows.reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
 }
 
 /// `shade.lookup`: V of every pixel that sees a surface, NaN elsewhere. `answer` is asked where it takes a lookup:
@@ -147,13 +236,14 @@ pub fn filter_points(
     });
 }
 
-/// `prepare.ids`: the object of every texel's triangle, [`GBuffer::NOTHING`] where there is none.
+/// `prepare.ids`: the object of every texel's triangle, [`GBuffer::NOTHING`] where there is none; anything outside the
+/// map's window.
 pub fn object_ids(scene: &Scene, maps: &[ShadowMapView]) -> Vec<Vec<u32>> {
-    let ids_of = |triangles: &[u32]| {
+    let fill_ids = |ids: &mut [u32], triangles: &[u32], depths: &[f32]| {
         // Neighbours mostly see the same object.
         let (mut range, mut id) = (0..0, GBuffer::NOTHING);
-        let id_of = |&triangle: &u32| {
-            if triangle == GBuffer::NOTHING {
+        let id_of = |(&triangle, &depth): (&u32, &f32)| {
+            if depth <= 0.0 {
                 return GBuffer::NOTHING;
             }
             let triangle = triangle as usize;
@@ -163,11 +253,17 @@ pub fn object_ids(scene: &Scene, maps: &[ShadowMapView]) -> Vec<Vec<u32>> {
             }
             id
         };
-        triangles.iter().map(id_of).collect::<Vec<_>>()
+        ids.iter_mut().zip(triangles.iter().zip(depths).map(id_of)).for_each(|(to, id)| *to = id);
     };
     let ids_of_map = |map: &ShadowMapView| {
-        let rows = map.triangles.par_chunks((map.map.width as usize).max(1));
-        rows.flat_map_iter(ids_of).collect()
+        let (mut ids, width) = (vec![0; map.triangles.len()], (map.map.width as usize).max(1));
+        let [columns, rows] = map.window.clone().map(|side| side.start as usize..side.end as usize);
+        ids.par_chunks_mut(width).enumerate().skip(rows.start).take(rows.len()).for_each(|(row, ids)| {
+            let line = row * width..(row + 1) * width;
+            let (triangles, depths) = (&map.triangles[line.clone()], &map.map.depth[line]);
+            fill_ids(&mut ids[columns.clone()], &triangles[columns.clone()], &depths[columns.clone()]);
+        });
+        ids
     };
     maps.iter().map(ids_of_map).collect()
 }

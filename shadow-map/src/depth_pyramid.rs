@@ -1,5 +1,7 @@
 //! The nearest depth of any rectangle of texels in four reads: what decides that a filter has nothing to find.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use scene_core::raster::DepthMap;
 
@@ -19,13 +21,21 @@ struct Level {
 impl DepthPyramid {
     /// The pyramid above `map`, reversed depth: the greatest is the nearest. A map without texels has no levels.
     pub fn new(map: &DepthMap) -> Self {
+        Self::of(map, &(0..map.height))
+    }
+
+    /// The pyramid above some rows of `map`: what is asked must lie in them.
+    pub fn of(map: &DepthMap, rows: &Range<u32>) -> Self {
+        let mut asked = rows.start as usize..rows.end as usize;
         let (mut width, mut height) = (map.width as usize, map.height as usize);
         let mut levels: Vec<Level> = Vec::new();
         while width > 1 || height > 1 {
             let below = levels.last().map_or(map.depth.as_slice(), |level| level.depth.as_slice());
             let (columns, rows) = (width.div_ceil(2), height.div_ceil(2));
             let mut depth = vec![0.0f32; columns * rows];
-            depth.par_chunks_mut(columns).enumerate().for_each(|(row, line)| {
+            asked = asked.start / 2..asked.end.div_ceil(2).min(rows);
+            let lines = depth.par_chunks_mut(columns).enumerate().skip(asked.start).take(asked.len());
+            lines.for_each(|(row, line)| {
                 let upper = &below[2 * row * width..][..width];
                 let lower = &below[(2 * row + 1).min(height - 1) * width..][..width];
                 for ((nearest, a), b) in line.iter_mut().zip(upper.chunks(2)).zip(lower.chunks(2)) {

@@ -10,7 +10,9 @@ use scene_core::{GBuffer, Report, VisibilityImage};
 use crate::PreparedVariant;
 use crate::cpu;
 use crate::light_maps::{LightMaps, Receiver, ShadowMapView};
+use crate::patches::{Form, Outcome, Patch, PatchRow, Questions, patches_of};
 use crate::receiver_plane::{is_behind, is_near, meets, rises_above};
+use crate::texel_outcomes::TexelOutcomes;
 
 impl LightMaps<'_> {
     /// V of one receiver, 0 or 1.
@@ -53,23 +55,59 @@ impl LightMaps<'_> {
     }
 }
 
+impl LightMaps<'_> {
+    /// [`hard`](Self::hard) for every pixel, those of a patch together. Returns how many needed no lookup.
+    pub fn shade_hard(&self, gbuffer: &GBuffer, patches: &[PatchRow], values: &mut [f32]) -> u64 {
+        let fill = |patch: &Patch, questions: &mut Questions, outcomes: &mut TexelOutcomes| {
+            outcomes.fill(self, patch, questions, Form::Hard, [0.0; 2], |_, _| GBuffer::NOTHING)
+        };
+        let known = |outcomes: &TexelOutcomes, point: Vec3, _| {
+            let map = &self.maps[outcomes.view];
+            let [column, row] = map.texel(map.view.project(point)?);
+            v_of(outcomes.at(column as i32, row as i32))
+        };
+        let ask = |_: Option<&TexelOutcomes>, receiver: &Receiver, _: &mut u64| self.hard(receiver);
+        let [_, known] = cpu::shade_patches(self, gbuffer, patches, values, fill, v_of, known, ask);
+        known
+    }
+}
+
+fn v_of(outcome: Outcome) -> Option<f32> {
+    match outcome {
+        Outcome::Clear => Some(1.0),
+        Outcome::Blocks => Some(0.0),
+        Outcome::Unknown => None,
+    }
+}
+
 /// The variant: its maps are all there is to it.
 #[derive(Debug)]
-pub(crate) struct Hard<'a>(pub(crate) LightMaps<'a>);
+pub(crate) struct Hard<'a> {
+    pub(crate) maps: LightMaps<'a>,
+    pub(crate) skip: bool,
+}
 
 impl PreparedVariant for Hard<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage, report: &mut Report) {
-        report.time("shade.lookup", |_| {
-            cpu::shade_pixels(&self.0, gbuffer, visibility, |receiver| self.0.hard(receiver));
-        });
+        if self.skip {
+            let known = report.time("shade.lookup", |_| {
+                let patches = patches_of(&self.maps.scene, gbuffer);
+                self.maps.shade_hard(gbuffer, &patches, &mut visibility.values)
+            });
+            report.skip("lookups", known);
+        } else {
+            report.time("shade.lookup", |_| {
+                cpu::shade_pixels(&self.maps, gbuffer, visibility, |receiver| self.maps.hard(receiver));
+            });
+        }
     }
 
     fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32], report: &mut Report) {
-        report
-            .time("shade.lookup", |_| cpu::answer_points(points, visibility, |point| self.0.hard_at(point)));
+        let answer = |point| self.maps.hard_at(point);
+        report.time("shade.lookup", |_| cpu::answer_points(points, visibility, answer));
     }
 
     fn maps(&self) -> &[ShadowMapView] {
-        &self.0.maps
+        &self.maps.maps
     }
 }

@@ -17,6 +17,7 @@ mod moments;
 mod multi_view;
 mod object_id;
 mod params;
+pub mod patches;
 mod pcf;
 mod pcss;
 pub mod pixel_hash;
@@ -25,13 +26,14 @@ pub mod receiver_plane;
 pub mod search_region;
 pub mod taps;
 mod technique;
+pub mod texel_outcomes;
 pub mod texel_plane;
 pub mod view_casters;
 
 use std::fmt::Debug;
 
 use glam::Vec3;
-use scene_core::relevance::{self, Backdrops, CasterChunks, Receivers, RelevantCasters};
+use scene_core::relevance::{self, Backdrops, CasterChunks, Receivers};
 use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
 
 use cascaded::Cascaded;
@@ -45,6 +47,7 @@ pub use params::{Kernel, ShadowMapParams, Variant};
 use pcf::Pcf;
 use pcss::Pcss;
 pub use technique::Factory;
+use view_casters::ViewNeeds;
 
 /// The technique: settings, from which any number of lights can be prepared.
 #[derive(Clone, Copy, Debug, Default)]
@@ -102,7 +105,7 @@ impl ShadowMap {
             let reach = self.params.reach_texels().filter(|_| self.params.skip)?;
             report.time("prepare.relevance", |report| {
                 let map_size = self.params.map_size;
-                let receivers = Receivers::seen_by(scene, camera, light);
+                let receivers = Receivers::seen_closely_by(scene, camera, light);
                 let of = |view: &LightView| {
                     let seen = if views.len() > 1 {
                         let sides = view_casters::looked_up_in(view, map_size, reach)?;
@@ -112,13 +115,17 @@ impl ShadowMap {
                     };
                     let region =
                         view_casters::looked_up_behind(scene, light, &seen, &[*view], map_size, reach);
-                    Some(relevance::relevant_casters(scene, &region, chunks, |id| {
+                    let casters = relevance::relevant_casters(scene, &region, chunks, |id| {
                         let object = &scene.objects()[id as usize];
                         !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
-                    }))
+                    });
+                    // A filter that goes on into this face from that beside it is there by up to its reach more to the side.
+                    let reach = if views.len() > 1 { 3.0 * reach } else { reach };
+                    let window = view_casters::looked_up_texels(view, &seen, map_size, reach);
+                    Some(ViewNeeds { casters, window })
                 };
                 let kept = views.iter().map(of).collect::<Option<Vec<_>>>()?;
-                kept.iter().for_each(|kept| kept.book(report));
+                kept.iter().for_each(|kept| kept.book(report, map_size));
                 Some(kept)
             })
         })
@@ -140,7 +147,7 @@ impl ShadowMap {
             Variant::ObjectId => Box::new(ObjectId::new(maps, params, report)),
             Variant::Moments => Box::new(Moments::new(maps, params, report)),
             Variant::Hard | Variant::Cascaded | Variant::MultiView | Variant::AliasFree => {
-                Box::new(Hard(maps))
+                Box::new(Hard { maps, skip: params.skip })
             }
         }
     }
@@ -149,7 +156,7 @@ impl ShadowMap {
         &self,
         scene: &'a Scene,
         light: &Light,
-        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<Vec<RelevantCasters>>,
+        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<Vec<ViewNeeds>>,
     ) -> (PreparedShadowMap<'a>, Report) {
         let (mut report, params) = (Report::default(), &self.params);
         let draw = |report: &mut Report| LightMaps::draw(scene, light, params, report, choose);

@@ -7,13 +7,17 @@ use glam::{Vec2, Vec3};
 use scene_core::geometry::Object;
 use scene_core::light::LightPoint;
 use scene_core::raster::DepthMap;
-use scene_core::relevance::{self, Backdrops, CasterRegion, RelevantCasters};
-use scene_core::{GBuffer, Light, Origin, Report, Scene};
+use scene_core::relevance::{self, Backdrops, CasterRegion};
+use scene_core::{Light, Origin, Report, Scene};
 
 use crate::cpu;
 use crate::light_views::{self, LightView};
 use crate::receiver_plane::{is_behind, meets, plane_tolerance};
+use crate::view_casters::ViewNeeds;
 use crate::{ShadowMapParams, Variant};
+
+/// As far beside a map as matters: farther than any filter reaches, and columns and rows still fit into an `i32`.
+const FAR_TEXEL: f32 = 1e6;
 
 /// What the light sees through one view: depth and triangle a texel.
 #[derive(Clone, Debug)]
@@ -22,15 +26,41 @@ pub struct ShadowMapView {
     pub view: LightView,
     /// Reversed depth; 0 where there is no caster.
     pub map: DepthMap,
-    /// The triangle seen, as an index into [`Scene::triangles`].
+    /// The triangle seen, as an index into [`Scene::triangles`]; anything where there is no caster.
     pub triangles: Vec<u32>,
+    /// The texels that are looked up; others may hold anything, and rows after them may not be held.
+    pub window: Window,
 }
 
+/// Columns and rows of a map.
+pub type Window = [Range<u32>; 2];
+
 impl ShadowMapView {
+    /// A map of no texels yet.
+    pub(crate) fn undrawn(view: LightView) -> Self {
+        Self { view, map: DepthMap::default(), triangles: Vec::new(), window: [0..0, 0..0] }
+    }
+
+    /// A map of no casters, of which the rows up to the window's last are held.
+    pub(crate) fn empty(view: LightView, size: u32, window: Option<&Window>) -> Self {
+        let window = window.cloned().unwrap_or([0..size, 0..size]);
+        // A pyramid reads pairs of rows.
+        let texels = size as usize * window[1].end.next_multiple_of(2).min(size) as usize;
+        let map = DepthMap { width: size, height: size, depth: vec![0.0; texels] };
+        Self { view, map, triangles: vec![0; texels], window }
+    }
+
+    /// Normalised device coordinates in texels: column and row, a texel's centre at one half; beside the map, too.
+    #[inline]
+    pub(crate) fn texel_at(&self, ndc: Vec2) -> Vec2 {
+        let at = Vec2::new(ndc.x * 0.5 + 0.5, 0.5 - ndc.y * 0.5) * self.map.width as f32;
+        at.clamp(Vec2::splat(-FAR_TEXEL), Vec2::splat(FAR_TEXEL))
+    }
+
     /// Column and row of normalised device coordinates within the map. Row 0 is on top, as in every image; NDC 1 belongs to
     /// the last texel.
     #[inline]
-    fn texel(&self, ndc: Vec2) -> [usize; 2] {
+    pub(crate) fn texel(&self, ndc: Vec2) -> [usize; 2] {
         let (size, last) = (self.map.width as f32, self.map.width as usize - 1);
         [ndc.x * 0.5 + 0.5, 0.5 - ndc.y * 0.5].map(|at| ((at * size) as usize).min(last))
     }
@@ -87,7 +117,7 @@ impl<'a> LightMaps<'a> {
         light: &Light,
         params: &ShadowMapParams,
         report: &mut Report,
-        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<Vec<RelevantCasters>>,
+        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<Vec<ViewNeeds>>,
     ) -> Self {
         Self::draw_in(Origin::WORLD, Cow::Borrowed(scene), *light, params, report, choose)
     }
@@ -105,7 +135,7 @@ impl<'a> LightMaps<'a> {
         light: Light,
         params: &ShadowMapParams,
         report: &mut Report,
-        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<Vec<RelevantCasters>>,
+        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<Vec<ViewNeeds>>,
     ) -> Self {
         let tolerance = plane_tolerance(scene.bounds(), &light);
         let (casters, views) = report.time("prepare.views", |_| {
@@ -121,8 +151,10 @@ impl<'a> LightMaps<'a> {
         let leaves_out_empty = chosen.is_some() && params.variant == Variant::Hard;
         let mut views = views.views;
         let maps = report.time("prepare.maps", |report| {
-            let mut ranges: Vec<Vec<Range<usize>>> = match chosen {
-                Some(chosen) => chosen.into_iter().map(|casters| casters.ranges).collect(),
+            let mut needs: Vec<(Vec<Range<usize>>, Option<Window>)> = match chosen {
+                Some(chosen) => {
+                    chosen.into_iter().map(|needs| (needs.casters.ranges, Some(needs.window))).collect()
+                }
                 None => {
                     let reaches_into = |view: &LightView| {
                         let is_face = params.skip && views.len() > 1;
@@ -131,19 +163,19 @@ impl<'a> LightMaps<'a> {
                     };
                     let of = |view: &LightView| {
                         let objects = casters.drawn.iter().filter(reaches_into(view));
-                        objects.map(|object| object.triangles.clone()).collect()
+                        (objects.map(|object| object.triangles.clone()).collect(), None)
                     };
                     views.iter().map(of).collect()
                 }
             };
-            let undrawn = ranges.iter().filter(|ranges| ranges.is_empty()).count();
+            let undrawn = needs.iter().filter(|(ranges, _)| ranges.is_empty()).count();
             report.skip("undrawn faces", if params.skip { undrawn as u64 } else { 0 });
             if leaves_out_empty {
-                let mut of_views = ranges.iter();
-                views.retain(|_| of_views.next().is_some_and(|ranges| !ranges.is_empty()));
-                ranges.retain(|ranges| !ranges.is_empty());
+                let mut of_views = needs.iter();
+                views.retain(|_| of_views.next().is_some_and(|(ranges, _)| !ranges.is_empty()));
+                needs.retain(|(ranges, _)| !ranges.is_empty());
             }
-            cpu::render_maps_of(&scene, &ranges, &views, params.map_size)
+            cpu::render_maps_of(&scene, &needs, &views, params.map_size)
         });
         let backdrops = casters.backdrops.into_iter().cloned().collect();
         let maps = Self { origin, scene, light, maps, backdrops, tolerance };
@@ -182,9 +214,9 @@ impl<'a> LightMaps<'a> {
             let around = |at: usize| at.saturating_sub(1)..=(at + 1).min(last);
             around(row).any(|row| {
                 around(column).any(|column| {
-                    let triangle = map.triangles[row * (last + 1) + column];
-                    triangle != GBuffer::NOTHING && {
-                        let corners = self.scene.corners(triangle as usize);
+                    let texel = row * (last + 1) + column;
+                    map.map.depth[texel] > 0.0 && {
+                        let corners = self.scene.corners(map.triangles[texel] as usize);
                         is_behind(corners, receiver, light, tolerance) && meets(corners, receiver, light)
                     }
                 })

@@ -25,8 +25,9 @@ use crate::light_maps::{LightMaps, ShadowMapView};
 use crate::light_points::{light_points, weight};
 use crate::light_views::light_views;
 use crate::params::HARD_REACH;
+use crate::patches::patches_of;
 use crate::receiver_plane::plane_tolerance;
-use crate::view_casters::looked_up_behind;
+use crate::view_casters::{looked_up_behind, looked_up_texels};
 use crate::{PreparedVariant, ShadowMapParams};
 
 /// The variant. Nothing is drawn before there are receivers.
@@ -100,10 +101,13 @@ impl<'a> MultiView<'a> {
                 (casters, views)
             });
             report.skip("faces", views.skipped_faces);
+            let size = self.params.map_size;
+            let mut windows = None;
             let ranges: Vec<_> = if self.params.skip {
                 report.time("shade.relevance", |report| {
                     let receivers = Receivers::within(self.scene, boxes, &light);
-                    let size = self.params.map_size;
+                    let of = |view| looked_up_texels(view, &receivers, size, HARD_REACH);
+                    windows = Some(views.views.iter().map(of).collect::<Vec<_>>());
                     let region =
                         looked_up_behind(self.scene, &light, &receivers, &views.views, size, HARD_REACH);
                     let objects = self.scene.objects();
@@ -121,7 +125,8 @@ impl<'a> MultiView<'a> {
                     self.scene,
                     &ranges,
                     &views.views,
-                    self.params.map_size,
+                    windows.as_deref(),
+                    size,
                     &mut scratch,
                     &mut maps,
                 );
@@ -147,9 +152,28 @@ impl PreparedVariant for MultiView<'_> {
             let tiles = TileBounds::of_receivers(self.scene, gbuffer);
             (tiles.boxes(), tiles.bounds())
         });
+        let (patches, mut answers) = report.time("shade.lookup", |_| match self.params.skip {
+            true => (patches_of(self.scene, gbuffer), vec![0.0; gbuffer.pixel_count()]),
+            false => Default::default(),
+        });
         let mut sums = vec![Sum::default(); gbuffer.pixel_count()];
         let width = gbuffer.width.max(1) as usize;
         self.for_each_point(&boxes, bounds, report, |maps, point, report| {
+            if self.params.skip {
+                let known = report.time("shade.lookup", |_| {
+                    let known = maps.shade_hard(gbuffer, &patches, &mut answers);
+                    let pixels = sums.par_iter_mut().zip(&answers).zip(&gbuffer.position);
+                    pixels.with_min_len(4096).for_each(|((sum, &v), &position)| {
+                        let share = weight(&self.light, point, position);
+                        if share > 0.0 {
+                            sum.add(share, v);
+                        }
+                    });
+                    known
+                });
+                report.skip("lookups", known);
+                return;
+            }
             report.time("shade.lookup", |_| {
                 sums.par_chunks_mut(width).enumerate().for_each(|(row, sums)| {
                     for (column, sum) in sums.iter_mut().enumerate() {

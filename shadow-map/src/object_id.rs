@@ -15,7 +15,9 @@ use crate::cpu;
 use crate::filter_maps::FilterMaps;
 use crate::light_maps::{LightMaps, Receiver, ShadowMapView};
 use crate::params::ShadowMapParams;
+use crate::patches::Form;
 use crate::pcf::Filter;
+use crate::texel_outcomes::TexelOutcomes;
 
 /// The variant: maps, ids and a filter.
 #[derive(Debug)]
@@ -33,8 +35,8 @@ impl<'a> ObjectId<'a> {
         Self { maps: FilterMaps::new(maps, params.skip, report), filter: Filter::new(params), objects }
     }
 
-    fn answer(&self, receiver: &Receiver, lit: &mut u64) -> f32 {
-        self.filter.answer(&self.maps, receiver, lit, |taps, stored| {
+    fn answer(&self, receiver: &Receiver, outcomes: Option<&TexelOutcomes>, lit: &mut u64) -> f32 {
+        self.filter.answer(&self.maps, receiver, outcomes, lit, |taps, stored| {
             self.objects[stored.view][stored.index] != receiver.object && taps.is_behind(stored)
         })
     }
@@ -42,17 +44,22 @@ impl<'a> ObjectId<'a> {
 
 impl PreparedVariant for ObjectId<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage, report: &mut Report) {
-        let lit = report.time("shade.filter", |_| {
-            cpu::filter_pixels(&self.maps.maps, gbuffer, visibility, |receiver, lit| {
-                self.answer(receiver, lit)
-            })
-        });
-        report.skip("filters", lit);
+        self.filter.shade(
+            &self.maps,
+            gbuffer,
+            visibility,
+            Form::Ids,
+            |view, index| self.objects[view][index],
+            |receiver, outcomes, lit| self.answer(receiver, outcomes, lit),
+            report,
+        );
     }
 
     fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32], report: &mut Report) {
         report.time("shade.filter", |_| {
-            cpu::filter_points(&self.maps.maps, points, visibility, |receiver| self.answer(receiver, &mut 0));
+            cpu::filter_points(&self.maps.maps, points, visibility, |receiver| {
+                self.answer(receiver, None, &mut 0)
+            });
         });
     }
 

@@ -7,7 +7,9 @@
 //!
 //! Limits: the blur is as wide at the contact as far from it and as many texels wide whatever the light's size.
 
-use glam::Vec2;
+use std::cell::Cell;
+
+use glam::{Vec2, Vec3};
 use scene_core::{GBuffer, Report, VisibilityImage};
 
 use crate::PreparedVariant;
@@ -15,9 +17,11 @@ use crate::cpu;
 use crate::filter_maps::FilterMaps;
 use crate::light_maps::{LightMaps, Receiver, ShadowMapView};
 use crate::params::{Kernel, ShadowMapParams};
+use crate::patches::{Form, Outcome, Patch, Questions, patches_of};
 use crate::pixel_hash::pixel_numbers;
 use crate::poisson_disk::poisson_disk;
 use crate::taps::{Stored, Taps};
+use crate::texel_outcomes::{TexelOutcomes, bits};
 
 /// The variant: maps and a filter.
 #[derive(Debug)]
@@ -31,24 +35,29 @@ impl<'a> Pcf<'a> {
         Self { maps: FilterMaps::new(maps, params.skip, report), filter: Filter::new(params) }
     }
 
-    fn answer(&self, receiver: &Receiver, lit: &mut u64) -> f32 {
-        self.filter.answer(&self.maps, receiver, lit, |taps, stored| taps.blocks(stored))
+    fn answer(&self, receiver: &Receiver, outcomes: Option<&TexelOutcomes>, lit: &mut u64) -> f32 {
+        self.filter.answer(&self.maps, receiver, outcomes, lit, |taps, stored| taps.blocks(stored))
     }
 }
 
 impl PreparedVariant for Pcf<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage, report: &mut Report) {
-        let lit = report.time("shade.filter", |_| {
-            cpu::filter_pixels(&self.maps.maps, gbuffer, visibility, |receiver, lit| {
-                self.answer(receiver, lit)
-            })
-        });
-        report.skip("filters", lit);
+        self.filter.shade(
+            &self.maps,
+            gbuffer,
+            visibility,
+            Form::Filter,
+            |_, _| GBuffer::NOTHING,
+            |receiver, outcomes, lit| self.answer(receiver, outcomes, lit),
+            report,
+        );
     }
 
-    fn visibility_at(&self, points: &[glam::Vec3], visibility: &mut [f32], report: &mut Report) {
+    fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32], report: &mut Report) {
         report.time("shade.filter", |_| {
-            cpu::filter_points(&self.maps.maps, points, visibility, |receiver| self.answer(receiver, &mut 0));
+            cpu::filter_points(&self.maps.maps, points, visibility, |receiver| {
+                self.answer(receiver, None, &mut 0)
+            });
         });
     }
 
@@ -79,70 +88,209 @@ impl Filter {
         }
     }
 
-    /// V of `receiver`: one less the share of taps that `blocks` says shadow it. Counts in `lit` what needed no tap.
+    /// `shade.filter`: V of every pixel by `answer`, which is given what the texels are to the pixel's patch.
+    #[expect(clippy::too_many_arguments, reason = "what is read, what is written, and three questions")]
+    pub(crate) fn shade(
+        &self,
+        maps: &FilterMaps<'_>,
+        gbuffer: &GBuffer,
+        visibility: &mut VisibilityImage,
+        form: Form,
+        object_of: impl Fn(usize, usize) -> u32 + Sync,
+        answer: impl Fn(&Receiver, Option<&TexelOutcomes>, &mut u64) -> f32 + Sync,
+        report: &mut Report,
+    ) {
+        let lit = report.time("shade.filter", |_| {
+            if !maps.skip {
+                let one = |receiver: &Receiver, lit: &mut u64| answer(receiver, None, lit);
+                return cpu::filter_pixels(&maps.maps, gbuffer, visibility, one);
+            }
+            let reach = match self {
+                Self::Grid(side) => [f64::from(*side) * 0.5, f64::from(*side) * 0.5 + 1.0],
+                Self::Disk { radius, .. } => [f64::from(*radius) + 1.0; 2],
+            };
+            let fill = |patch: &Patch, questions: &mut Questions, outcomes: &mut TexelOutcomes| {
+                outcomes.fill(&maps.maps, patch, questions, form, reach, &object_of)
+            };
+            // What blocks everywhere is a sum of weights, which rounding may keep from all.
+            let constant = |outcome| (outcome == Outcome::Clear).then_some(1.0);
+            let patches = patches_of(&maps.maps.scene, gbuffer);
+            let values = &mut visibility.values;
+            let ask = |outcomes: Option<&TexelOutcomes>, receiver: &Receiver, lit: &mut u64| {
+                answer(receiver, outcomes, lit)
+            };
+            let known = |outcomes: &TexelOutcomes, point, pixel| self.known(maps, point, pixel, outcomes);
+            cpu::shade_patches(&maps.maps, gbuffer, &patches, values, fill, constant, known, ask).iter().sum()
+        });
+        report.skip("filters", lit);
+    }
+
+    /// V of `receiver`: one less the share of taps that `blocks` says shadow it, where that is not known from `outcomes`
+    /// already. Counts in `lit` what needed no tap.
     #[inline]
     pub(crate) fn answer(
         &self,
         maps: &FilterMaps<'_>,
         receiver: &Receiver,
+        outcomes: Option<&TexelOutcomes>,
         lit: &mut u64,
         blocks: impl Fn(&Taps<'_>, &Stored) -> bool,
     ) -> f32 {
         let Some(taps) = Taps::new(maps, receiver) else {
             return 1.0;
         };
-        let (first, last) = self.reach(&taps);
-        if maps.skip && taps.is_clear(first, last) {
-            *lit += 1;
-            return 1.0;
+        if maps.skip && outcomes.is_none() {
+            let (first, last) = self.reach(taps.texel);
+            if taps.is_clear(first, last) {
+                *lit += 1;
+                return 1.0;
+            }
         }
-        let is_blocked = |column, row| taps.risen(column, row).is_some_and(|stored| blocks(&taps, &stored));
+        let ask = |column, row| taps.risen(column, row).is_some_and(|stored| blocks(&taps, &stored));
+        match self {
+            Self::Grid(side) => match outcomes {
+                Some(outcomes) => grid_of_bits(*side, taps.texel, |column, row| {
+                    let all = || [0, u128::MAX >> (127 - side)];
+                    let [blocked, unknown] = outcomes.run(column, row, (side + 1) as u32).unwrap_or_else(all);
+                    bits(unknown)
+                        .filter(|&bit| ask(column + bit as i32, row))
+                        .fold(blocked, |blocked, bit| blocked | 1 << bit)
+                }),
+                None => grid(*side, taps.texel, ask),
+            },
+            Self::Disk { .. } => self.disk(receiver.pixel, taps.texel, |column, row| {
+                match outcomes.map_or(Outcome::Unknown, |outcomes| outcomes.at(column, row)) {
+                    Outcome::Unknown => ask(column, row),
+                    known => known == Outcome::Blocks,
+                }
+            }),
+        }
+    }
+
+    /// V where each texel in reach is known.
+    #[inline]
+    fn known(
+        &self,
+        maps: &FilterMaps<'_>,
+        point: Vec3,
+        pixel: [u32; 2],
+        outcomes: &TexelOutcomes,
+    ) -> Option<f32> {
+        let map = &maps.maps.maps[outcomes.view];
+        let texel = map.texel_at(map.view.project_beyond(point)?);
         match self {
             Self::Grid(side) => {
-                let fraction = taps.texel - *side as f32 * 0.5 - Vec2::new(first[0] as f32, first[1] as f32);
-                let weight = |step: i32, fraction: f32| match step {
-                    0 => 1.0 - fraction,
-                    step if step == *side => fraction,
-                    _ => 1.0,
-                };
-                let mut dark = 0.0;
+                let (first, count) = (first_of_grid(*side, texel), (side + 1) as u32);
+                let run = |row: i32| outcomes.run(first[0], first[1] + row, count);
+                let mut any = 0;
                 for row in 0..=*side {
-                    let mut line = 0.0;
-                    for column in 0..=*side {
-                        if is_blocked(first[0] + column, first[1] + row) {
-                            line += weight(column, fraction.x);
-                        }
+                    let [blocked, unknown] = run(row)?;
+                    if unknown != 0 {
+                        return None;
                     }
-                    dark += line * weight(row, fraction.y);
+                    any |= blocked;
                 }
-                // The weights add up to side² but for rounding.
-                (1.0 - dark / (side * side) as f32).clamp(0.0, 1.0)
+                if any == 0 {
+                    return Some(1.0);
+                }
+                let blocked = |_, row| outcomes.run(first[0], row, count).map_or(0, |[blocked, _]| blocked);
+                Some(grid_of_bits(*side, texel, blocked))
             }
-            Self::Disk { offsets, seed, .. } => {
-                let [turn, _] = pixel_numbers(receiver.pixel, *seed);
-                let rotation = Vec2::from_angle(turn * std::f32::consts::TAU);
-                let dark = offsets.iter().filter(|offset| {
-                    let at = (taps.texel + rotation.rotate(**offset)).floor();
-                    is_blocked(at.x as i32, at.y as i32)
+            Self::Disk { .. } => {
+                let is_known = Cell::new(true);
+                let v = self.disk(pixel, texel, |column, row| {
+                    let outcome = outcomes.at(column, row);
+                    is_known.set(is_known.get() && outcome != Outcome::Unknown);
+                    outcome == Outcome::Blocks
                 });
-                1.0 - dark.count() as f32 / offsets.len() as f32
+                is_known.get().then_some(v)
             }
         }
     }
 
+    /// V by some texels of a circle; none of a grid's.
+    #[inline]
+    fn disk(&self, pixel: [u32; 2], texel: Vec2, is_blocked: impl Fn(i32, i32) -> bool) -> f32 {
+        let Self::Disk { offsets, seed, .. } = self else { return 1.0 };
+        let [turn, _] = pixel_numbers(pixel, *seed);
+        let rotation = Vec2::from_angle(turn * std::f32::consts::TAU);
+        let dark = offsets.iter().filter(|offset| {
+            let at = (texel + rotation.rotate(**offset)).floor();
+            is_blocked(at.x as i32, at.y as i32)
+        });
+        1.0 - dark.count() as f32 / offsets.len() as f32
+    }
+
     /// The first and last texel that may be asked.
     #[inline]
-    fn reach(&self, taps: &Taps<'_>) -> ([i32; 2], [i32; 2]) {
+    fn reach(&self, texel: Vec2) -> ([i32; 2], [i32; 2]) {
         match self {
             Self::Grid(side) => {
-                let first = (taps.texel - *side as f32 * 0.5).floor().to_array().map(|at| at as i32);
+                let first = first_of_grid(*side, texel);
                 (first, first.map(|at| at + side))
             }
             Self::Disk { radius, .. } => {
                 // A rotated offset may be longer than the radius by rounding: a texel more on each side.
                 let at = |corner: Vec2| corner.floor().to_array().map(|at| at as i32);
-                (at(taps.texel - radius - 1.0), at(taps.texel + radius + 1.0))
+                (at(texel - radius - 1.0), at(texel + radius + 1.0))
             }
         }
     }
+}
+
+/// The first column and row of a grid of `side` + 1 texels around a place.
+#[inline]
+fn first_of_grid(side: i32, texel: Vec2) -> [i32; 2] {
+    (texel - side as f32 * 0.5).floor().to_array().map(|at| at as i32)
+}
+
+/// The weight of a row or column of a grid, the first and the last by the share of it in the square.
+#[inline]
+fn weight(side: i32, step: i32, fraction: f32) -> f32 {
+    match step {
+        0 => 1.0 - fraction,
+        step if step == side => fraction,
+        _ => 1.0,
+    }
+}
+
+/// V by all texels of a square.
+#[inline]
+fn grid(side: i32, texel: Vec2, is_blocked: impl Fn(i32, i32) -> bool) -> f32 {
+    let first = first_of_grid(side, texel);
+    let fraction = texel - side as f32 * 0.5 - Vec2::new(first[0] as f32, first[1] as f32);
+    let mut dark = 0.0;
+    for row in 0..=side {
+        let mut line = 0.0;
+        for column in 0..=side {
+            if is_blocked(first[0] + column, first[1] + row) {
+                line += weight(side, column, fraction.x);
+            }
+        }
+        dark += line * weight(side, row, fraction.y);
+    }
+    // The weights add up to side² but for rounding.
+    (1.0 - dark / (side * side) as f32).clamp(0.0, 1.0)
+}
+
+/// [`grid`] with a bit for each texel of a row that blocks, from the column and in the row that `blocked` is given: the same
+/// sums in the same order.
+#[inline]
+fn grid_of_bits(side: i32, texel: Vec2, blocked: impl Fn(i32, i32) -> u128) -> f32 {
+    let first = first_of_grid(side, texel);
+    let fraction = texel - side as f32 * 0.5 - Vec2::new(first[0] as f32, first[1] as f32);
+    let whole = u128::MAX >> (127 - side);
+    let mut all = 0.0;
+    (0..=side).for_each(|step| all += weight(side, step, fraction.x));
+    let mut dark = 0.0;
+    for row in 0..=side {
+        let blocked = blocked(first[0], first[1] + row);
+        let line = if blocked == whole {
+            all
+        } else {
+            bits(blocked).fold(0.0, |line, step| line + weight(side, step as i32, fraction.x))
+        };
+        dark += line * weight(side, row, fraction.y);
+    }
+    (1.0 - dark / (side * side) as f32).clamp(0.0, 1.0)
 }

@@ -18,9 +18,6 @@ use crate::light_maps::{Receiver, ShadowMapView};
 use crate::receiver_plane::meets;
 use crate::texel_plane::TexelPlane;
 
-/// As far beside a map as matters: farther than any filter reaches, and columns and rows still fit into an `i32`.
-const FAR_TEXEL: f32 = 1e6;
-
 /// Looks up texels around one receiver.
 #[derive(Debug)]
 pub struct Taps<'m> {
@@ -73,8 +70,7 @@ impl<'m> Taps<'m> {
             maps,
             receiver: *receiver,
             view,
-            texel: (Vec2::new(ndc.x * 0.5 + 0.5, 0.5 - ndc.y * 0.5) * size as f32)
-                .clamp(Vec2::splat(-FAR_TEXEL), Vec2::splat(FAR_TEXEL)),
+            texel: views[view].texel_at(ndc),
             plane: TexelPlane::new(&views[view].view, size, receiver),
             to_light,
             slope: 1.0 + (1.0 - cos * cos).max(0.0).sqrt() / cos,
@@ -197,7 +193,8 @@ impl<'m> Taps<'m> {
     /// Question 2: whether the receiver lies behind the stored triangle's plane.
     #[inline]
     pub fn is_behind(&self, stored: &Stored) -> bool {
-        self.maps.is_behind(self.triangle(stored), self.receiver.point, self.receiver.tolerance)
+        let Receiver { point, tolerance, .. } = self.receiver;
+        self.maps.is_behind_texel(stored.view, stored.index, point, tolerance)
     }
 
     /// Question 3: whether the stored point may be of the receiver's own surface.

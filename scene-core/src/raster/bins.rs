@@ -74,8 +74,11 @@ impl Bins {
 
     fn push_flat(&mut self, frame: &Frame<'_>, triangle: FlatTriangle) {
         let index = self.flat.len() as u32;
-        let rows = covered(min3(triangle.y), max3(triangle.y), frame.height);
-        let columns = covered(min3(triangle.x), max3(triangle.x), frame.width);
+        let within = |covered: Range<i32>, window: &Range<i32>| {
+            covered.start.max(window.start)..covered.end.min(window.end)
+        };
+        let rows = within(covered(min3(triangle.y), max3(triangle.y), frame.height), &frame.window[1]);
+        let columns = within(covered(min3(triangle.x), max3(triangle.x), frame.width), &frame.window[0]);
         if rows.is_empty() || columns.is_empty() {
             return;
         }
@@ -194,10 +197,11 @@ pub(super) fn sort_piece<S: Simd>(simd: S, frame: &Frame<'_>, piece: &Piece, bin
         let (x_min, x_max) = (x0.min(x1).min(x2), x0.max(x1).max(x2));
         let (y_min, y_max) = (y0.min(y1).min(y2), y0.max(y1).max(y2));
         let half = SUBPIXELS / 2;
-        let column0 = ((x_min + (half - 1)) >> SUBPIXEL_BITS).max(0);
-        let column1 = ((x_max - half) >> SUBPIXEL_BITS).min(frame.width - 1);
-        let row0 = ((y_min + (half - 1)) >> SUBPIXEL_BITS).max(0);
-        let row1 = ((y_max - half) >> SUBPIXEL_BITS).min(frame.height - 1);
+        let [columns, rows] = &frame.window;
+        let column0 = ((x_min + (half - 1)) >> SUBPIXEL_BITS).max(columns.start);
+        let column1 = ((x_max - half) >> SUBPIXEL_BITS).min(columns.end - 1);
+        let row0 = ((y_min + (half - 1)) >> SUBPIXEL_BITS).max(rows.start);
+        let row1 = ((y_max - half) >> SUBPIXEL_BITS).min(rows.end - 1);
         let covers = column0.simd_le(column1) & row0.simd_le(row1);
 
         // No overflow: a guarded coordinate has 24 bits.

@@ -75,6 +75,9 @@ pub struct DepthOptions<'a> {
     /// If given, only triangles in one of these ranges of [`Scene::triangles`] are drawn. They may come in any
     /// order; what lies outside the scene is ignored. Objects that do not cast are never drawn.
     pub triangles: Option<&'a [Range<usize>]>,
+    /// If given, the columns and rows that matter: pixels inside of them are those of the whole target, bit for bit;
+    /// one outside may hold what it held before or a part of what lies there, and rows after them may not be held at all.
+    pub window: Option<&'a [Range<u32>; 2]>,
 }
 
 /// Depth seen through a projection, row by row from the top left.
@@ -138,7 +141,7 @@ pub fn render_depth_into(
     target: &mut DepthMap,
 ) {
     let drawing = drawing(scene, clip_from_world, options, target.width, target.height);
-    let band = band_pixels(target);
+    let band = band_pixels(target, options);
     let bands = target.depth.par_chunks_mut(band).map(|depth| depth_pixels(depth, options));
     draw(&drawing, casters(scene, options), scratch, bands);
 }
@@ -157,8 +160,13 @@ pub fn render_depth_and_triangles_into(
     triangles: &mut Vec<u32>,
 ) {
     let drawing = drawing(scene, clip_from_world, options, target.width, target.height);
-    let band = band_pixels(target);
-    triangles.resize(target.depth.len(), GBuffer::NOTHING);
+    let band = band_pixels(target, options);
+    if options.window.is_some() && triangles.is_empty() {
+        // Zeroes that nobody looks at cost no memory.
+        *triangles = vec![0; target.depth.len()];
+    } else {
+        triangles.resize(target.depth.len(), GBuffer::NOTHING);
+    }
     let bands = target
         .depth
         .par_chunks_mut(band)
@@ -180,7 +188,7 @@ pub fn render_depth_and_objects_into(
     objects: &mut Vec<u32>,
 ) {
     render_depth_and_triangles_into(scene, clip_from_world, options, scratch, target, objects);
-    let band = band_pixels(target);
+    let band = (target.width as usize * BAND_ROWS).max(1);
     objects.par_chunks_mut(band).for_each(|objects| {
         // Neighbours mostly see the same object.
         let (mut range, mut id) = (0..0, GBuffer::NOTHING);
@@ -195,10 +203,17 @@ pub fn render_depth_and_objects_into(
     });
 }
 
-/// Sizes a target and returns the pixels of a full band.
-fn band_pixels(target: &mut DepthMap) -> usize {
+/// Sizes a target, to the last band that matters, and returns the pixels of a full band.
+fn band_pixels(target: &mut DepthMap, options: &DepthOptions<'_>) -> usize {
     let (width, height) = (target.width as usize, target.height as usize);
-    target.depth.resize(width * height, 0.0);
+    let rows = options
+        .window
+        .map_or(height, |window| (window[1].end as usize).next_multiple_of(BAND_ROWS).min(height));
+    if target.depth.is_empty() {
+        target.depth = vec![0.0; width * rows];
+    } else {
+        target.depth.resize(width * rows, 0.0);
+    }
     (width * BAND_ROWS).max(1)
 }
 
@@ -217,6 +232,10 @@ pub(super) fn drawing<'a>(
 ) -> Drawing<'a> {
     assert!(width <= MAX_SIDE && height <= MAX_SIDE, "a side of {width} × {height} is above {MAX_SIDE}");
     let reversed = options.convention == DepthConvention::Reversed;
+    let window = |axis: usize, size: u32| {
+        let all = 0..size as i32;
+        options.window.map_or(all, |w| w[axis].start.min(size) as i32..w[axis].end.min(size) as i32)
+    };
     Drawing {
         scene,
         projection: Projection::new(&clip_from_world.as_dmat4(), width, height, reversed),
@@ -224,6 +243,7 @@ pub(super) fn drawing<'a>(
         height,
         cull: options.cull,
         clamp: options.range == DepthRange::Clamp,
+        window: [window(0, width), window(1, height)],
     }
 }
 

@@ -59,6 +59,8 @@ pub(super) struct Drawing<'a> {
     pub(super) cull: Cull,
     /// Depths out of range are clamped instead of rejected.
     pub(super) clamp: bool,
+    /// Columns and rows that matter.
+    pub(super) window: [Range<i32>; 2],
 }
 
 /// What every task reads.
@@ -70,6 +72,8 @@ pub(super) struct Frame<'a> {
     pub(super) height: i32,
     pub(super) cull: Cull,
     pub(super) clamp: bool,
+    /// Triangles that touch none of these columns or none of these rows are not sorted in.
+    pub(super) window: [Range<i32>; 2],
 }
 
 /// Draws the triangles of `ranges`, each within one object, into `bands`, which take 32 rows each from the top.
@@ -90,6 +94,12 @@ pub(super) fn draw<P: Pixels>(
         height: drawing.height as i32,
         cull: drawing.cull,
         clamp: drawing.clamp,
+        window: drawing.window.clone(),
+    };
+    let [columns, rows] = &drawing.window;
+    let bands_seen = match columns.is_empty() || rows.is_empty() {
+        true => 0..0,
+        false => rows.start as usize / BAND_ROWS..(rows.end as usize).div_ceil(BAND_ROWS),
     };
     let band_count = (drawing.height as usize).div_ceil(BAND_ROWS);
     let bins = &mut scratch.bins[..scratch.tasks.len()];
@@ -100,7 +110,7 @@ pub(super) fn draw<P: Pixels>(
         }
     });
     let bins = &scratch.bins[..scratch.tasks.len()];
-    bands.enumerate().for_each(|(band, mut pixels)| {
+    bands.enumerate().filter(|(band, _)| bands_seen.contains(band)).for_each(|(band, mut pixels)| {
         pixels.begin();
         dispatch!(level, simd => fill_band(simd, &frame, band, bins, &mut pixels));
         pixels.finish();
@@ -138,16 +148,52 @@ impl RasterScratch {
         }
     }
 
-    /// Projects the scene's vertices.
+    /// Projects the scene's vertices: all, or where few triangles are drawn those between their least and their
+    /// greatest, piece by piece.
     fn project(&mut self, drawing: &Drawing<'_>) {
         let level = self.level;
         let positions = drawing.scene.positions();
-        self.vertices.resize(positions.len(), [0; 4]);
-        let chunks = self.vertices.par_chunks_mut(VERTEX_CHUNK).zip(positions.par_chunks(VERTEX_CHUNK));
-        chunks.for_each(|(vertices, positions)| {
+        if self.vertices.len() < positions.len() {
+            // Zeroes that nobody looks at cost no memory.
+            self.vertices = vec![[0; 4]; positions.len()];
+        }
+        let project = |(vertices, positions): (&mut [ScreenVertex], &[glam::Vec3])| {
             dispatch!(level, simd => project_vertices(simd, &drawing.projection, positions, vertices));
-        });
+        };
+        let drawn: usize = self.pieces.iter().map(|piece| piece.triangles.len()).sum();
+        if 2 * drawn >= drawing.scene.triangles().len() {
+            let vertices = self.vertices[..positions.len()].par_chunks_mut(VERTEX_CHUNK);
+            vertices.zip(positions.par_chunks(VERTEX_CHUNK)).for_each(project);
+            return;
+        }
+        let mut parts = Vec::with_capacity(self.pieces.len());
+        let (mut rest, mut start) = (&mut self.vertices[..], 0);
+        for range in vertices_of(drawing.scene, &self.pieces) {
+            let (part, after) = rest[range.start - start..].split_at_mut(range.len());
+            (rest, start) = (after, range.end);
+            parts.extend(part.chunks_mut(VERTEX_CHUNK).zip(positions[range].chunks(VERTEX_CHUNK)));
+        }
+        parts.into_par_iter().for_each(project);
     }
+}
+
+/// Ascending and disjoint ranges that hold the vertices of all pieces.
+fn vertices_of(scene: &Scene, pieces: &[Piece]) -> Vec<Range<usize>> {
+    let of = |piece: &Piece| {
+        let corners = scene.triangles()[piece.triangles.clone()].iter().flatten();
+        let [first, last] = corners.fold([u32::MAX, 0], |[first, last], &i| [first.min(i), last.max(i)]);
+        first as usize..last as usize + 1
+    };
+    let mut ranges: Vec<_> = pieces.par_iter().filter(|piece| !piece.triangles.is_empty()).map(of).collect();
+    ranges.sort_unstable_by_key(|range| range.start);
+    ranges.dedup_by(|next, last| {
+        let joins = next.start <= last.end;
+        if joins {
+            last.end = last.end.max(next.end);
+        }
+        joins
+    });
+    ranges
 }
 
 #[inline(always)]

@@ -40,6 +40,7 @@ pub fn render_gbuffer_with(scene: &Scene, camera: &Camera, scratch: &mut RasterS
         height,
         cull: Cull::None,
         clamp: false,
+        window: [0..width as i32, 0..height as i32],
     };
     let band = (width as usize * BAND_ROWS).max(1);
     let bands = gbuffer.depth.par_chunks_mut(band).zip(gbuffer.triangle.par_chunks_mut(band)).map(

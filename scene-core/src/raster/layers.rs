@@ -44,6 +44,7 @@ pub fn count_layers(scene: &Scene, clip_from_world: Mat4, width: u32, height: u3
         height,
         cull: Cull::None,
         clamp: true,
+        window: [0..width as i32, 0..height as i32],
     };
     let all = scene.objects().iter().zip(0..).map(|(o, id)| (o.triangles.clone(), id));
     draw(&drawing, all, &mut RasterScratch::new(), bands.map(|(front, back)| CountPixels { front, back }));

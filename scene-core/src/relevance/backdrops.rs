@@ -1,6 +1,7 @@
 //! Casters with nothing behind them: the ground under everything shadows no surface.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use crate::geometry::Object;
 use crate::light::LightPoint;
@@ -21,7 +22,7 @@ pub struct Backdrops<'a> {
 /// `tolerance` is the distance in scene units below which a point does not count as behind a plane. It must be
 /// that of the technique's own comparison: then leaving such a caster out changes no pixel.
 pub fn told_apart<'a>(scene: &'a Scene, light: &Light, tolerance: f32) -> Backdrops<'a> {
-    let casters = scene.objects().iter().filter(|o| o.flags.casts && !o.triangles.is_empty());
+    let casters = scene.objects().par_iter().filter(|o| o.flags.casts && !o.triangles.is_empty());
     let (backdrops, drawn) = casters.partition(|object| nothing_behind(scene, light, object, tolerance));
     Backdrops { drawn, backdrops }
 }
@@ -45,7 +46,7 @@ pub fn told_apart_with_solids<'a>(scene: &'a Scene, light: &Light, tolerance: f3
 pub const MOST_OF_A_SOLID: usize = 64;
 
 fn is_solid_under_all(scene: &Scene, light: &Light, object: &Object, tolerance: f32) -> bool {
-    if object.alpha.is_some() || object.triangles.len() > MOST_OF_A_SOLID || !is_closed(scene, object) {
+    if object.alpha.is_some() || object.triangles.len() > MOST_OF_A_SOLID {
         return false;
     }
     let vertices = &scene.positions()[object.vertices.clone()];
@@ -73,7 +74,8 @@ fn is_solid_under_all(scene: &Scene, light: &Light, object: &Object, tolerance: 
                     || o.bounds.corners().into_iter().all(|p| outwards.dot(p - a) >= -0.5 * tolerance)
             });
     }
-    supports
+    // Few come here, and sorting edges takes longest.
+    supports && is_closed(scene, object)
 }
 
 /// Whether each edge of an object, by exact position, is one of two triangles.

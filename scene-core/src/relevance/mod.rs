@@ -29,7 +29,7 @@ pub use casters::{CasterChunks, RelevantCasters, relevant_casters};
 pub use classes::{TileClasses, classify_tiles};
 pub use extent::reach_of;
 pub use polyhedron::{HalfSpace, Polyhedron, Side};
-pub use receivers::{Receivers, objects_among, reached_receivers};
+pub use receivers::{MOST_TRIANGLES, Receivers, objects_among, reached_receivers};
 pub use region::CasterRegion;
 pub use tiles::{TILE, Tile, TileBounds, TileClass};
 pub use validity::{Change, Remake, what_remains};

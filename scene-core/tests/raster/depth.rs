@@ -9,7 +9,7 @@ use glam::{Affine3A, Mat4, Vec2, Vec3};
 use gnomon_scene_core::geometry::{AlphaMask, ObjectFlags, Wrap};
 use gnomon_scene_core::raster::{
     Cull, DepthConvention, DepthMap, DepthOptions, DepthRange, RasterScratch, depth_error, render_depth,
-    render_depth_and_objects_into, render_depth_into,
+    render_depth_and_objects_into, render_depth_and_triangles_into, render_depth_into,
 };
 use gnomon_scene_core::{GBuffer, Scene, TriangleMesh};
 use proptest::prelude::*;
@@ -225,6 +225,41 @@ fn objects_are_those_of_the_nearest_surface() {
     let at = |x: u32, y: u32| objects[(y * SIZE + x) as usize];
     assert_eq!([at(5, 5), at(15, 15), at(30, 30), at(45, 45)], [0, 1, 1, GBuffer::NOTHING]);
     assert_eq!(map, render_depth(&scene, pixel_space(SIZE), SIZE, SIZE, &options));
+}
+
+/// Inside of a window all is as without, of triangles of every size and of few of them.
+#[test]
+fn a_window_is_a_part_of_the_whole() {
+    let (width, height) = (300, 200);
+    let matrix = camera(width, height).projection_from_world();
+    let scene = soup(3, 4000);
+    let draw = |triangles: &[std::ops::Range<usize>], window: Option<&[std::ops::Range<u32>; 2]>| {
+        let options = DepthOptions { triangles: Some(triangles), window, ..Default::default() };
+        let (mut map, mut ids) = (DepthMap { width, height, depth: Vec::new() }, Vec::new());
+        let mut scratch = RasterScratch::new();
+        render_depth_and_triangles_into(&scene, matrix, &options, &mut scratch, &mut map, &mut ids);
+        (map, ids)
+    };
+    for triangles in [vec![0..4000], vec![100..180, 171..400, 3000..3001]] {
+        let (whole, whole_ids) = draw(&triangles, None);
+        for window in
+            [[0..300, 0..200], [17..50, 70..71], [250..300, 31..97], [9..9, 5..70], [280..900, 180..900]]
+        {
+            let (part, ids) = draw(&triangles, Some(&window));
+            let mut seen = 0;
+            for row in window[1].start..window[1].end.min(height) {
+                for column in window[0].start..window[0].end.min(width) {
+                    let pixel = (row * width + column) as usize;
+                    assert_eq!(part.depth[pixel].to_bits(), whole.depth[pixel].to_bits(), "{column}, {row}");
+                    assert!(part.depth[pixel] == 0.0 || ids[pixel] == whole_ids[pixel]);
+                    seen += usize::from(part.depth[pixel] > 0.0);
+                }
+            }
+            assert!(seen > 0 || window[0].is_empty());
+            let drawn = |map: &DepthMap| map.depth.iter().filter(|&&depth| depth > 0.0).count();
+            assert!(drawn(&part) < drawn(&whole) || window[1] == (0..height), "{window:?} draws all");
+        }
+    }
 }
 
 /// A used scratch and target leave nothing behind.

@@ -25,7 +25,7 @@ pub(crate) fn maps_of_gpu<'a>(
     let Some((buffer, stride)) = on_gpu.depths() else { panic!("no depths") };
     let depths: Vec<f32> = gpu.read_buffer(buffer).unwrap();
     for (layer, map) in (0..).zip(&mut maps.maps) {
-        let ShadowMapView { view, map, triangles } = map;
+        let ShadowMapView { view, map, triangles, .. } = map;
         *triangles = gpu.read_texture(on_gpu.layers().ids().unwrap(), layer).unwrap();
         let first = layer as usize * stride as usize;
         map.depth.copy_from_slice(&depths[first..first + triangles.len()]);
