@@ -16,7 +16,7 @@ use scene_core::geometry::facing;
 use scene_core::{Camera, Report, SceneSetup, VisibilityImage, raster, scenes};
 
 fn methods(criterion: &mut Criterion) {
-    for spec in ["ball", "knot", "log-cabin", "chess"] {
+    for spec in ["ball", "knot", "log-cabin", "chess", "street", "forest:triangles=200000"] {
         let setup = scenes::build(spec, 0.0).expect("a built-in scene");
         let (scene, light, camera) = (&setup.scene, setup.lights[0], setup.camera.with_size(512, 512));
         let gbuffer = raster::render_gbuffer(scene, &camera);

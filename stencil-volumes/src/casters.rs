@@ -63,7 +63,8 @@ impl<'a> Casters<'a> {
     pub fn relevant(&self, light: &Light, camera: &Camera, report: &mut Report) -> Vec<Range<usize>> {
         let hidden = self.in_anothers_shadow(light);
         report.skip("casters in another's shadow", hidden.len() as u64);
-        let region = CasterRegion::of(self.scene, camera, light);
+        // Only the middle of the light throws shadows.
+        let region = CasterRegion::of(self.scene, camera, &light.reduced_to(light.center()));
         let kept =
             relevant_casters(self.scene, &region, &self.chunks, |id| hidden.binary_search(&id).is_err());
         kept.book(report);

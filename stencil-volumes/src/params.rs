@@ -43,8 +43,8 @@ pub struct VolumeParams {
     /// counted, which costs more, and for all pixels if there are more silhouette edges than [`crate::volumes::most_edges`]; no
     /// pixel changes. Off only to measure.
     pub rays: bool,
-    /// Leave out what cannot change the image: casters outside the region that matters or in another's shadow. On the CPU
-    /// alone: on the GPU the blocks of the image leave out what does not reach them, and nothing else is asked.
+    /// Leave out what cannot change the image: casters outside the region that matters or, on the CPU, in another's shadow;
+    /// receivers of `planar` that nobody sees.
     pub skip: bool,
 }
 

@@ -214,3 +214,26 @@ fn planar_receivers() {
         }
     }
 }
+
+/// Faces that cannot matter have no edges if skipping is on, and no pixel changes.
+#[test]
+fn skipping_changes_no_pixel() {
+    let Some(gpu) = testing::gpu() else { return };
+    for name in ["street", "chess", "forest:triangles=20000"] {
+        let setup = scenes::build(name, 0.0).unwrap();
+        let camera = Camera { fov_y: 0.2, ..setup.camera.with_size(96, 72) };
+        let gbuffer = raster::render_gbuffer(&setup.scene, &camera);
+        let bounds = setup.scene.bounds();
+        for light in [setup.lights[0], Light::Point { position: bounds.center() + 0.2 * bounds.size() }] {
+            let [with, without] = [true, false].map(|skip| {
+                // Counted as far as can be: rays would hide what is missing.
+                let params = VolumeParams { skip, rays: false, ..Default::default() };
+                on_gpu(&gpu, &setup.scene, &camera, &light, &gbuffer, params)
+            });
+            let bits = |image: &VisibilityImage| image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            assert!(bits(&with.0) == bits(&without.0), "{name}, {light:?}");
+            assert!(with.1[0] <= without.1[0], "{name}, {light:?}: edges {} {}", with.1[0], without.1[0]);
+            println!("{name} {}: {} of {} edges", light.kind(), with.1[0], without.1[0]);
+        }
+    }
+}

@@ -20,6 +20,19 @@
 //! is computed with a bound on its rounding, and where it is not certain, one exact ray decides. And it fills: each side is
 //! drawn over all pixels that it covers, a hundred times over in a forest. The tiles ask most sides once for 4,096 pixels.
 //!
+//! # Why no indirect arguments
+//! Nothing that the CPU records hangs on what the GPU finds. Edges are counted in a buffer, and the passes behind loop up to that
+//! count: a workgroup is a block or a tile of the image, of which there are as many as there are pixels for. Only `shade.rays` has work
+//! whose amount is unknown, and runs a fixed number of threads over the list. Arguments written by the GPU would spare the idle
+//! ones among at most 1,024 workgroups, whose one read is a count of nought, and would add a pass that writes them and the one by
+//! which wgpu checks every indirect dispatch. No call less would be recorded.
+//!
+//! # What is skipped
+//! With `skip`, faces outside the region that can shadow what is seen are turned by nobody, so they have no edges. The region's
+//! planes come from the objects' boxes, the only thing beside recording that a frame asks of the CPU. Its report counts objects
+//! outside; what blocks, tiles and the facing pass leave out is known on the device alone, and nothing is read back for a
+//! report.
+//!
 //! # Why the eye's count is all that z-fail needs
 //! The count at a point is the count at the eye plus the crossings on the way from there. The first is one number a frame:
 //! the faces between the eye and the light. So `z-fail` and `auto` come down to the same, `z-pass` with that number, and

@@ -7,6 +7,7 @@ use scene_core::gpu::{
     SceneBindings, SceneGroups, VisibilityPass, VisibilityPassParts, WorkBuffer, binding, binding_limit,
 };
 use scene_core::light::LightPoint;
+use scene_core::relevance::CasterRegion;
 use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Report, Scene};
 
@@ -52,6 +53,7 @@ pub struct VolumesOnGpu {
     list_bytes: u64,
     tables: Option<Tables>,
     settings: HeldBuffer,
+    region: HeldBuffer,
     facing: WorkBuffer,
     counters: WorkBuffer,
     edges: WorkBuffer,
@@ -102,8 +104,13 @@ impl VolumesOnGpu {
             Pass { pass: ComputePass::new(device, label, wgsl, entry, &groups), own }
         };
         let lit = Binds::TrianglesAndReceivers;
-        let find_facing =
-            pass("volumes facing", shaders::FACING, "find_facing", Binds::Triangles, &[READ, WRITE, WRITE]);
+        let find_facing = pass(
+            "volumes facing",
+            shaders::FACING,
+            "find_facing",
+            Binds::Triangles,
+            &[READ, WRITE, WRITE, READ],
+        );
         let extract = pass(
             "volumes silhouette",
             shaders::SILHOUETTE,
@@ -134,6 +141,7 @@ impl VolumesOnGpu {
             list_bytes: LISTS,
             tables: None,
             settings: HeldBuffer::uniform("volumes"),
+            region: HeldBuffer::storage("region of casters"),
             facing: WorkBuffer::new("facings"),
             counters: WorkBuffer::new("counters"),
             edges: WorkBuffer::new("edges of the silhouette"),
@@ -181,6 +189,11 @@ impl VolumesOnGpu {
         let counters = self.counters.get(device, 4 * COUNTERS)?;
         let edges = self.edges.get(device, 16 * u64::from(tables.edges))?;
         recorder.encoder.clear_buffer(&counters, 0, None);
+        let planes = report.time("prepare.relevance", |report| match self.params.skip {
+            true => region_planes(geometry, query, report),
+            false => Vec::new(),
+        });
+        let region = self.region.get(device, bytemuck::cast_slice(&planes));
         let scene = self.scene.groups(device, &query.scene);
         let triangles = Some(&scene.triangles);
 
@@ -189,6 +202,7 @@ impl VolumesOnGpu {
             tables.casts.clone().into(),
             facing.clone().into(),
             counters.clone().into(),
+            region.into(),
         ];
         let own = self.find_facing.own.get(device, &own);
         let groups = [Some(&own), triangles];
@@ -344,6 +358,26 @@ impl VolumesOnGpu {
     pub fn pixels(&mut self, device: &wgpu::Device) -> Result<wgpu::Buffer, TechniqueError> {
         Ok(self.pixels.get(device, 16)?)
     }
+}
+
+/// The half-spaces around all that can shadow what the camera sees, as the facing pass reads them; books the objects outside.
+fn region_planes(scene: &Scene, query: &GpuShadowQuery<'_>, report: &mut Report) -> Vec<Vec4> {
+    // Only the middle of the light throws shadows.
+    let light = query.light.reduced_to(query.light.center());
+    let region = CasterRegion::of(scene, query.camera, &light);
+    let casters = scene.objects().iter().filter(|o| o.flags.casts && !o.triangles.is_empty());
+    let outside = casters.filter(|o| !region.touches(&o.bounds)).count();
+    report.skip("casters outside view", outside as u64);
+    if region.is_empty() {
+        // No point has 0·x ≤ −1.
+        return vec![Vec4::NEG_W];
+    }
+    let planes = region.planes().iter().filter_map(|plane| {
+        let length = plane.normal.length();
+        let unit = (plane.normal / length).extend(plane.offset / length).as_vec4();
+        unit.is_finite().then_some(unit)
+    });
+    planes.collect()
 }
 
 /// Workgroups of 64 for so many elements, in two dimensions.
