@@ -6,11 +6,11 @@ use std::sync::{Arc, LazyLock};
 use gnomon_contact_hardening::{ContactHardening, ContactHardeningParams, Factory};
 use scene_core::technique::{Params, Setting, SettingKind, SettingsError, ShadowTechnique, TechniqueFactory};
 
-/// Names of sources: the technique's own map first.
-const NAMES: [&str; 6] = ["own", "uniform", "alias-free", "cascaded", "psm", "volumes"];
+/// Names of sources: first what suits the light, then the technique's own map.
+const NAMES: [&str; 7] = ["auto", "own", "uniform", "alias-free", "cascaded", "psm", "volumes"];
 
-/// What each but the first is: a technique and its variant, `None` for its default.
-const SOURCES: [(&dyn TechniqueFactory, Option<&str>); NAMES.len() - 1] = [
+/// What each but the first two is: a technique and its variant, `None` for its default.
+const SOURCES: [(&dyn TechniqueFactory, Option<&str>); NAMES.len() - 2] = [
     (&gnomon_shadow_map::Factory, Some("hard")),
     (&gnomon_shadow_map::Factory, Some("alias-free")),
     (&gnomon_shadow_map::Factory, Some("cascaded")),
@@ -23,7 +23,8 @@ static SETTINGS: LazyLock<Vec<Setting>> = LazyLock::new(|| {
         name: "source",
         kind: SettingKind::Choice(&NAMES),
         unit: "",
-        doc: "whose hard shadows are blurred: the own map's, or another technique's of the same map_size",
+        doc: "whose hard shadows are blurred: exact ones of directional lights and else the own map's, always those, \
+              or another technique's of the same map_size",
     };
     ContactHardeningParams::SETTINGS.iter().copied().chain([source]).collect()
 });
@@ -65,8 +66,8 @@ impl TechniqueFactory for OnAnySource {
             value: name.clone(),
             expected: SettingKind::Choice(&NAMES).expected(),
         })?;
-        let Some((factory, variant)) = place.checked_sub(1).and_then(|place| SOURCES.get(place)) else {
-            return Ok(Box::new(technique));
+        let Some((factory, variant)) = place.checked_sub(2).and_then(|place| SOURCES.get(place)) else {
+            return Ok(Box::new(if name == "own" { technique.on_own_map() } else { technique }));
         };
         let mut settings: Vec<_> =
             variant.iter().map(|variant| ("variant".to_owned(), (*variant).to_owned())).collect();
@@ -93,7 +94,7 @@ mod tests {
         for name in NAMES {
             assert_eq!(create(name).unwrap().settings()["source"], name);
         }
-        assert_eq!(FACTORY.create(None, &[]).unwrap().settings()["source"], "own");
+        assert_eq!(FACTORY.create(None, &[]).unwrap().settings()["source"], "auto");
     }
 
     #[test]

@@ -20,9 +20,9 @@ use std::sync::Arc;
 
 use gnomon_shadow_map::filter_maps::FilterMaps;
 use gnomon_shadow_map::light_maps::LightMaps;
-use gnomon_shadow_map::{ShadowMapParams, Variant as MapVariant};
+use gnomon_shadow_map::{ShadowMap, ShadowMapParams, Variant as MapVariant};
 use scene_core::technique::{PreparedShadow, ShadowQuery, ShadowTechnique, TechniqueError};
-use scene_core::{Camera, GBuffer, Report, VisibilityImage};
+use scene_core::{Camera, GBuffer, Light, Report, VisibilityImage};
 
 use kernel::Kernel;
 use look_up::LookUps;
@@ -36,14 +36,19 @@ pub use technique::Factory;
 #[derive(Clone, Default)]
 pub struct ContactHardening {
     params: ContactHardeningParams,
-    source: Option<Source>,
+    source: Source,
 }
 
-/// Where hard shadows come from, if not from the own map.
-#[derive(Clone)]
-struct Source {
-    name: String,
-    technique: Arc<dyn ShadowTechnique>,
+/// Where hard shadows come from.
+#[derive(Clone, Default)]
+enum Source {
+    /// From whichever of the two below suits the light: see [`ContactHardening::new`].
+    #[default]
+    Auto,
+    /// From the map that blockers are found in.
+    OwnMap,
+    /// From another technique.
+    Technique { name: String, technique: Arc<dyn ShadowTechnique> },
 }
 
 /// A light, prepared; holds for any camera if the source does.
@@ -55,21 +60,56 @@ pub struct PreparedContactHardening<'a> {
 }
 
 impl ContactHardening {
-    /// A technique with these settings. Hard shadows come from its own map, as `shadow-map` draws them.
+    /// A technique with these settings.
+    ///
+    /// With `physical` scaling the hard shadows of directional lights are shadow-map's `alias-free` ones, exact at
+    /// every pixel: a sun is far and small, so its penumbrae are mostly narrower than a texel of any map. Those of other
+    /// lights come from the [own map](Self::on_own_map).
     pub fn new(params: ContactHardeningParams) -> Self {
-        Self { params, source: None }
+        Self { params, source: Source::Auto }
+    }
+
+    /// The same with the hard shadows of the own map, whatever the light.
+    #[must_use]
+    pub fn on_own_map(self) -> Self {
+        Self { source: Source::OwnMap, ..self }
     }
 
     /// The same on top of any other technique's hard shadows; V below one half counts as shadowed. Blockers are still
     /// found in the own map, which no technique has to hold. Reports call the source `name`.
     #[must_use]
     pub fn on_top_of(self, name: impl Into<String>, source: Arc<dyn ShadowTechnique>) -> Self {
-        Self { source: Some(Source { name: name.into(), technique: source }), ..self }
+        Self { source: Source::Technique { name: name.into(), technique: source }, ..self }
     }
 
-    /// What reports call the source of hard shadows: `own` for the own map.
+    /// What reports call the source of hard shadows: `auto`, `own` for the own map, or a technique's name.
     pub fn source_name(&self) -> &str {
-        self.source.as_ref().map_or("own", |source| &source.name)
+        match &self.source {
+            Source::Auto => "auto",
+            Source::OwnMap => "own",
+            Source::Technique { name, .. } => name,
+        }
+    }
+
+    /// The technique whose hard shadows of some lights are blurred; those of others are the own map's.
+    fn source(&self) -> Option<Arc<dyn ShadowTechnique>> {
+        match &self.source {
+            Source::Auto if self.params.scaling == Scaling::Physical => {
+                let params = ShadowMapParams {
+                    variant: MapVariant::AliasFree,
+                    skip: self.params.skip,
+                    ..Default::default()
+                };
+                Some(Arc::new(ShadowMap::new(params)))
+            }
+            Source::Auto | Source::OwnMap => None,
+            Source::Technique { technique, .. } => Some(technique.clone()),
+        }
+    }
+
+    /// Whether the [source](Self::source) is asked for this light.
+    fn asks_source(&self, light: &Light) -> bool {
+        !matches!(self.source, Source::Auto) || matches!(light, Light::Directional { .. })
     }
 
     /// Pass 1: draws the map, and prepares the source.
@@ -110,9 +150,9 @@ impl ContactHardening {
         let filter = FilterMaps::new(maps, params.skip, &mut report);
         let look_ups = report.time("prepare.tiles", |_| LookUps::new(filter));
         report.bytes += look_ups.bytes();
-        let source = match &self.source {
+        let source = match self.source().filter(|_| self.asks_source(query.light)) {
             Some(source) => {
-                let (prepared, rest) = source.technique.prepare(query)?;
+                let (prepared, rest) = source.prepare(query)?;
                 let bytes = report.bytes;
                 report.merge(&rest);
                 report.bytes = bytes + rest.bytes;
@@ -178,6 +218,7 @@ impl PreparedContactHardening<'_> {
                     pyramid: &pyramid,
                     kernel: &self.kernel,
                     clip_from_world: camera.with_size(gbuffer.width, gbuffer.height).projection_from_world(),
+                    has_source: hard.is_some(),
                 };
                 report.time("shade.filter", |report| cpu::filter(&physical, visibility, report));
             }

@@ -141,17 +141,24 @@ impl Lone<'_> {
         self.receiver + (self.ways[0] + self.ways[1] * at.x + self.ways[2] * at.y) * t
     }
 
-    /// Whether no texel under the footprint of the light, `reach` times as wide, rises above the receiver's plane.
-    fn is_clear(&self, map: &FilterMaps<'_>, reach: f32, t: f32) -> bool {
+    /// Least and greatest column and row under the footprint of the light, `reach` times as wide. `None` where it is
+    /// unbounded.
+    fn bounds(&self, reach: f32, t: f32) -> Option<(Vec2, Vec2)> {
         let (mut min, mut max) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
         for corner in [Vec2::ONE, Vec2::NEG_ONE, Vec2::new(1.0, -1.0), Vec2::new(-1.0, 1.0)] {
             let place = self.place(corner * reach, t);
             let at = Vec2::new(place.x, place.y) / place.z;
             if !(place.z > 0.0 && at.is_finite()) {
-                return false;
+                return None;
             }
             (min, max) = (min.min(at), max.max(at));
         }
+        Some((min, max))
+    }
+
+    /// Whether no texel under the footprint of the light, `reach` times as wide, rises above the receiver's plane.
+    fn is_clear(&self, map: &FilterMaps<'_>, reach: f32, t: f32) -> bool {
+        let Some((min, max)) = self.bounds(reach, t) else { return false };
         // Places are rounded: a texel more on each side holds every line.
         let (min, max) = ((min - 1.0).max(Vec2::ZERO), max + 1.0);
         let end = self.size as f32 - 1.0;
@@ -169,6 +176,13 @@ impl Lines<'_, '_> {
     /// Whether it is proved that no line meets anything within the footprint at `t`, `reach` times the light's.
     pub fn is_clear(&self, reach: f32, t: f32) -> bool {
         self.lone.is_some_and(|lone| lone.is_clear(&self.look_ups.filter, reach, t))
+    }
+
+    /// How many texels the footprint at `t` is wide where it is narrowest, `reach` times the light's. `None` where it is
+    /// unbounded, or the faces of a cube hold it.
+    pub fn width(&self, reach: f32, t: f32) -> Option<f32> {
+        let (min, max) = self.lone.as_ref()?.bounds(reach, t)?;
+        Some((max - min).min_element())
     }
 
     /// The surface stored where the line to the light's point `at` is at `t`, if it shadows the receiver.

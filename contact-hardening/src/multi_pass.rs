@@ -38,7 +38,7 @@ pub fn multi_pass(physical: &Physical<'_>, sites: &[Site]) -> (Vec<f32>, u64) {
         let passes = (radius.ceil() as u32).clamp(1, physical.params.passes);
         let [x, y] = site.receiver.pixel.map(|at| at as usize);
         let pixel = y * width + x;
-        if physical.params.fill && physical.is_narrow(site, t) {
+        if physical.params.fill && physical.is_narrow(site, &lines, t) {
             return Some(Either::Right((pixel, 1.0 - physical.filter(site, &lines, &blockers, t, &mut 0))));
         }
         Some(Either::Left(Active { site: *site, pixel, t, passes }))

@@ -8,6 +8,11 @@
 //!    what the image does not show of it, is searched in the map.
 //! 3. *Filter* (pass 4). Points of the light are answered by S where the [footprint](crate::footprint) puts them.
 //!
+//! Image and map both sample the shadow. What is left to the map is answered by texels; where the footprint is narrower than
+//! one, they answer all of the light alike, and an S that a technique of its own found for the very pixel says more. So with
+//! such a source the image is asked first where texels are wider than pixels, and the pixel's own S is taken where the
+//! map cannot resolve the footprint.
+//!
 //! With `blocker = each` a point is asked at several distances between the nearest and the farthest blocker: it is dark
 //! if the line to it passes a stored blocker, or goes from above to below stored ones, between two of them.
 
@@ -51,6 +56,8 @@ pub struct Physical<'a> {
     pub kernel: &'a Kernel,
     /// World to the camera's clip space.
     pub clip_from_world: Mat4,
+    /// Whether S is another technique's, and not the map's.
+    pub has_source: bool,
 }
 
 /// A pixel whose surroundings are not proved equal.
@@ -120,6 +127,19 @@ enum Probe {
     Unknown,
 }
 
+/// What answers for a point that the image does not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fill {
+    /// Nothing does.
+    Nothing,
+    /// The map is proved to hold nothing there.
+    Lit,
+    /// The pixel's own S, where the footprint is narrower than a texel.
+    Pixel,
+    /// The map.
+    Map,
+}
+
 impl Physical<'_> {
     /// Whether the light is infinitely far.
     pub fn is_parallel(&self) -> bool {
@@ -168,7 +188,7 @@ impl Physical<'_> {
             return blockers;
         }
         let PixelRect { first, last } = site.reach;
-        let is_narrow = self.params.fill && self.is_narrow(site, site.t);
+        let is_narrow = self.params.fill && self.is_narrow(site, lines, site.t);
         if !is_narrow && site.reach.count() <= self.kernel.points.len() {
             for row in first[1]..=last[1] {
                 for column in first[0]..=last[0] {
@@ -292,12 +312,10 @@ impl Physical<'_> {
             }
         }
         let layers = &layers[..count];
-        let narrow = self.params.fill && self.is_narrow(site, mean);
-        let mut fill = [self.params.fill; MAX_LAYERS];
-        if self.params.fill {
-            for (fill, &t) in fill.iter_mut().zip(layers) {
-                *fill = !self.is_clear(lines, t, clear);
-            }
+        let narrow = self.params.fill && self.is_narrow(site, lines, mean);
+        let mut fill = [Fill::Nothing; MAX_LAYERS];
+        for (fill, &t) in fill.iter_mut().zip(layers) {
+            *fill = self.fill(lines, t, clear);
         }
         let asker = Asker { physical: self, site, lines, narrow, fill: &fill };
         let (mut dark, mut all) = (0.0, 0.0);
@@ -316,18 +334,38 @@ impl Physical<'_> {
                 dark += if blocked { weight } else { 0.0 };
             }
         }
-        if all > 0.0 {
-            1.0 - dark / all
+        if all > 0.0 { 1.0 - dark / all } else { 1.0 - self.own_shadow(site) }
+    }
+
+    /// Whether the map is asked before the image: where pixels are farther from each other than the kernel's points are,
+    /// and than texels are, if those have not made S.
+    pub fn is_narrow(&self, site: &Site, lines: &Lines<'_, '_>, t: f32) -> bool {
+        let (side, reach) = ((self.kernel.points.len() as f32).sqrt(), self.kernel.reach);
+        site.footprint.bounds(reach, t).is_some_and(|(min, max)| {
+            let pixels = (max - min).min_element();
+            let is_finer = || lines.width(reach, t).is_none_or(|texels| texels > pixels);
+            pixels < side && (!self.has_source || is_finer())
+        })
+    }
+
+    /// What answers for points of the layer `t` that the image does not.
+    fn fill(&self, lines: &Lines<'_, '_>, t: f32, clear: &mut u64) -> Fill {
+        let resolves = || lines.width(self.kernel.reach, t).is_none_or(|texels| texels > 1.0);
+        if !self.params.fill {
+            Fill::Nothing
+        } else if self.has_source && !resolves() {
+            Fill::Pixel
+        } else if self.is_clear(lines, t, clear) {
+            Fill::Lit
         } else {
-            let [x, y] = site.receiver.pixel.map(|at| at as usize);
-            1.0 - self.distance.shadow[y * self.distance.width + x]
+            Fill::Map
         }
     }
 
-    /// Whether pixels are farther from each other than the kernel's points are.
-    pub fn is_narrow(&self, site: &Site, t: f32) -> bool {
-        let side = (self.kernel.points.len() as f32).sqrt();
-        site.footprint.bounds(self.kernel.reach, t).is_some_and(|(min, max)| (max - min).min_element() < side)
+    /// S of the receiver's own pixel.
+    fn own_shadow(&self, site: &Site) -> f32 {
+        let [x, y] = site.receiver.pixel.map(|at| at as usize);
+        self.distance.shadow[y * self.distance.width + x]
     }
 
     /// Whether `pixel` has an S that [answers](Self::answers).
@@ -345,8 +383,8 @@ struct Asker<'a> {
     lines: &'a Lines<'a, 'a>,
     /// Whether the map is asked at once.
     narrow: bool,
-    /// Of each layer, whether the map may hold anything.
-    fill: &'a [bool; MAX_LAYERS],
+    /// Of each layer.
+    fill: &'a [Fill; MAX_LAYERS],
 }
 
 impl Asker<'_> {
@@ -390,15 +428,15 @@ impl Asker<'_> {
                 _ => Probe::Blocked(site.cone.share_of(physical.blocker(pixel))),
             };
         }
-        if !physical.params.fill {
-            return Probe::Unknown;
-        }
-        if !self.fill[layer] {
-            return Probe::Lit;
-        }
-        match self.lines.look_up(at, t) {
-            Met::Nothing => Probe::Lit,
-            Met::Blocker(share) => Probe::Blocked(share),
+        match self.fill[layer] {
+            Fill::Nothing => Probe::Unknown,
+            Fill::Lit => Probe::Lit,
+            Fill::Pixel if physical.own_shadow(site) == 0.0 => Probe::Lit,
+            Fill::Pixel => Probe::Blocked(t),
+            Fill::Map => match self.lines.look_up(at, t) {
+                Met::Nothing => Probe::Lit,
+                Met::Blocker(share) => Probe::Blocked(share),
+            },
         }
     }
 }

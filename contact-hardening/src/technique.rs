@@ -10,14 +10,17 @@ use scene_core::{Camera, GBuffer, Report, VisibilityImage};
 
 #[cfg(feature = "gpu")]
 use crate::gpu::ContactHardeningOnGpu;
-use crate::{ContactHardening, ContactHardeningParams, PreparedContactHardening, Scaling};
+use crate::{ContactHardening, ContactHardeningParams, PreparedContactHardening, Scaling, Source};
 
 impl ContactHardening {
     /// Why the source does not take this input, if it does not.
     fn source_excludes(&self, capability: Capability) -> Option<&'static str> {
-        match self.source.as_ref()?.technique.describe().support(capability) {
-            Support::Unsupported(why) => Some(why),
-            Support::Exact | Support::Approximate(_) => None,
+        match &self.source {
+            Source::Technique { technique, .. } => match technique.describe().support(capability) {
+                Support::Unsupported(why) => Some(why),
+                Support::Exact | Support::Approximate(_) => None,
+            },
+            Source::Auto | Source::OwnMap => None,
         }
     }
 }

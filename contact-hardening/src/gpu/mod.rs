@@ -33,12 +33,12 @@ use pyramid::PyramidOnGpu;
 
 /// The technique on one device: pipelines, and the map of the light prepared last.
 pub struct ContactHardeningOnGpu {
-    params: ContactHardeningParams,
+    technique: ContactHardening,
     maps: LightMapsOnGpu,
     filter: FilterMapsOnGpu,
     scene: SceneBindings,
     receivers: Receivers,
-    source: Option<Source>,
+    source: Option<SourceOnGpu>,
     settings: HeldBuffer,
     pyramid: PyramidOnGpu,
     images: Images,
@@ -47,9 +47,11 @@ pub struct ContactHardeningOnGpu {
 }
 
 /// Whose hard shadows are blurred.
-struct Source {
+struct SourceOnGpu {
     technique: Box<dyn GpuShadowTechnique>,
     image: Image,
+    /// Whether the light prepared last is one that it is asked for.
+    is_asked: bool,
 }
 
 /// A step with its pipeline.
@@ -119,10 +121,10 @@ impl ContactHardeningOnGpu {
             params.map_size,
             device.limits().max_texture_dimension_2d,
         )?;
-        let source = match &technique.source {
+        let source = match technique.source() {
             Some(source) => {
-                let technique = source.technique.gpu(device, ONE)?;
-                Some(Source { technique, image: Image::new("V of the source", ONE) })
+                let technique = source.gpu(device, ONE)?;
+                Some(SourceOnGpu { technique, image: Image::new("V of the source", ONE), is_asked: false })
             }
             None => None,
         };
@@ -163,7 +165,7 @@ impl ContactHardeningOnGpu {
             passes.push(Pass { step, pipeline, uniform: HeldBuffer::uniform("pass"), own: own.another() });
         }
         Ok(Self {
-            params,
+            technique: technique.clone(),
             maps: LightMapsOnGpu::new(device, map),
             filter: FilterMapsOnGpu::new(device, params.map_size, &scene.triangles_layout),
             scene,
@@ -196,13 +198,16 @@ impl ContactHardeningOnGpu {
             self.prepared = Some(Prepared {
                 maps: vec![drawn.maps.into(), drawn.views.into(), drawn.ids, depths.into()],
                 scene,
-                kernel: self.params.kernel_for(query.light),
+                kernel: self.technique.params.kernel_for(query.light),
                 is_parallel: matches!(query.light, Light::Directional { .. }),
             });
         }
         self.receivers.prepare(device, query);
         report.bytes = self.bytes();
         if let Some(source) = &mut self.source {
+            source.is_asked = self.technique.asks_source(query.light);
+        }
+        if let Some(source) = self.source.as_mut().filter(|source| source.is_asked) {
             let rest = source.technique.prepare(recorder, query)?;
             let bytes = report.bytes + rest.bytes;
             report.merge(&rest);
@@ -228,15 +233,20 @@ impl ContactHardeningOnGpu {
         let receivers = self.receivers.group(device, camera, gbuffer).ok_or_else(not_prepared)?;
         let mut report = Report::default();
         let source = match &mut self.source {
-            Some(Source { technique, image }) => {
+            Some(SourceOnGpu { technique, image, is_asked: true }) => {
                 let view = image.get(device, size);
                 report.merge(&technique.shade(recorder, camera, gbuffer, &view)?);
                 Some(view)
             }
-            None => None,
+            _ => None,
         };
-        let settings =
-            SettingsTable::new(&self.params, &prepared.kernel, prepared.is_parallel, source.is_some(), size);
+        let settings = SettingsTable::new(
+            &self.technique.params,
+            &prepared.kernel,
+            prepared.is_parallel,
+            source.is_some(),
+            size,
+        );
         let settings = self.settings.get(device, bytemuck::bytes_of(&settings));
         let tiles = self.pyramid.buffer(device, size)?;
         for Pass { step, pipeline, uniform, own } in &mut self.passes {
@@ -284,6 +294,6 @@ impl ContactHardeningOnGpu {
 
     /// Whether the preparation holds for any camera.
     pub fn survives_camera(&self) -> bool {
-        self.source.as_ref().is_none_or(|source| source.technique.survives_camera())
+        self.source.as_ref().is_none_or(|source| !source.is_asked || source.technique.survives_camera())
     }
 }
