@@ -30,7 +30,8 @@ impl EdgeRuns {
         let faces_of = |run: usize| {
             let faces =
                 edges_of(run, topology).flat_map(|edge| topology.faces(edge)).map(|f| f.face() as usize);
-            faces.fold(usize::MAX..0, |range, face| range.start.min(face)..range.end.max(face + 1))
+            let nothing = Range { start: usize::MAX, end: 0 };
+            faces.fold(nothing, |range, face| range.start.min(face)..range.end.max(face + 1))
         };
         Self { faces: starts.map(faces_of).collect() }
     }
@@ -124,7 +125,8 @@ mod tests {
         let runs = EdgeRuns::new(&topology);
         let all = facing(scene.positions(), scene.triangles(), light);
         let third = all.len() / 3;
-        for ranges in [vec![], vec![0..all.len()], vec![10..third, 2 * third..2 * third + 900]] {
+        for ranges in [vec![], vec![0..third, third..all.len()], vec![10..third, 2 * third..2 * third + 900]]
+        {
             let mut some = vec![0; all.len()];
             ranges.iter().for_each(|range| some[range.clone()].copy_from_slice(&all[range.clone()]));
             let expected = extract(&topology, scene.positions(), &some);

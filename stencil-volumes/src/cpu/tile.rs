@@ -112,11 +112,11 @@ impl Tile {
     /// Eight centres in steps.
     #[inline(always)]
     fn centers<S: Simd>(&self, simd: S, at: usize) -> [f64x8<S>; 2] {
-        let mut wide = [[0.0; LANES]; 2];
-        for lane in 0..LANES {
-            [wide[0][lane], wide[1][lane]] = self.center(at + lane);
+        let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
+        for (lane, (x, y)) in x.iter_mut().zip(&mut y).enumerate() {
+            [*x, *y] = self.center(at + lane);
         }
-        [f64x8::from_slice(simd, &wide[0]), f64x8::from_slice(simd, &wide[1])]
+        [f64x8::from_slice(simd, &x), f64x8::from_slice(simd, &y)]
     }
 
     /// Adds the multiplicity where `passes`; one that passes the other way is negative.

@@ -24,9 +24,10 @@ pub(super) fn shade(
         // Tile by tile: neighbours walk through the same nodes.
         for tile in 0..width.div_ceil(TILE) {
             for (row, values) in values.chunks_mut(width).enumerate() {
-                for x in tile * TILE..((tile + 1) * TILE).min(width) {
-                    let pixel = (band * TILE + row) * width + x;
-                    values[x] = match receivers.ask(pixel) {
+                let first = (band * TILE + row) * width;
+                for (x, value) in values.iter_mut().enumerate().skip(tile * TILE).take(TILE) {
+                    let pixel = first + x;
+                    *value = match receivers.ask(pixel) {
                         Asked::Nothing => f32::NAN,
                         Asked::Lit => 1.0,
                         Asked::Dark => {
