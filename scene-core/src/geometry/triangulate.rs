@@ -194,7 +194,14 @@ fn triangulate_flat(
 /// The polygon's distinct places, the place of each corner, and the first corner at each place.
 fn distinct_points(polygon: &[DVec2]) -> (Vec<Point2<f64>>, Vec<usize>, Vec<u32>) {
     let mut order: Vec<u32> = (0..polygon.len() as u32).collect();
-    let position = |i: u32| polygon[i as usize];
+    // Below what exact predicates can multiply, a coordinate is zero, and that without a sign: places are told apart
+    // after that.
+    let place = |p: &DVec2| {
+        let Point2 { x, y } = spade::mitigate_underflow(Point2::new(p.x, p.y));
+        Point2::new(x + 0.0, y + 0.0)
+    };
+    let places: Vec<Point2<f64>> = polygon.iter().map(place).collect();
+    let position = |i: u32| places[i as usize];
     order.sort_by(|&i, &j| {
         let (a, b) = (position(i), position(j));
         a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(i.cmp(&j))
@@ -205,9 +212,7 @@ fn distinct_points(polygon: &[DVec2]) -> (Vec<Point2<f64>>, Vec<usize>, Vec<u32>
         for &corner in run {
             point_of_corner[corner as usize] = points.len();
         }
-        let p = position(run[0]);
-        // Below what exact predicates can multiply, a coordinate is zero.
-        points.push(spade::mitigate_underflow(Point2::new(p.x, p.y)));
+        points.push(position(run[0]));
         corner_of_point.push(run[0]);
     }
     (points, point_of_corner, corner_of_point)
@@ -443,6 +448,27 @@ mod tests {
         let (triangles, _) = run(&l);
         assert_eq!(triangles.len(), 4);
         assert!(vector_areas(&l, &triangles).iter().all(|a| a.z > 0.0));
+    }
+
+    /// Corners that fall together in the best-fit plane, but for the sign of a zero.
+    #[test]
+    fn corners_apart_by_the_sign_of_zero_are_one_place() {
+        let tangle = [
+            [0, -1, 0],
+            [-2, 0, 0],
+            [0, 1, 0],
+            [-3, 2, 0],
+            [-2, -1, 0],
+            [0, 3, 0],
+            [-3, -1, 0],
+            [-2, 1, 0],
+            [3, -2, 1],
+            [1, -2, 1],
+        ];
+        let corners = tangle.map(|p: [i8; 3]| Vec3::from_array(p.map(f32::from)));
+        let (triangles, _) = run(&corners);
+        assert!(!triangles.is_empty());
+        assert!(triangles.iter().flatten().all(|&i| (i as usize) < corners.len()));
     }
 
     proptest::proptest! {
