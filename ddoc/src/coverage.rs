@@ -24,10 +24,11 @@ use gnomon_shadow_map::light_cone::LightCone;
 use gnomon_shadow_map::light_maps::Receiver;
 use scene_core::light::LightPoint;
 
+use crate::beam::Beam;
 use crate::silhouettes::Edge;
 
 /// Lanes that the compiler is given to fill.
-const LANES: usize = 16;
+pub(crate) const LANES: usize = 16;
 
 /// Edges of a tile, component by component.
 #[derive(Debug, Default)]
@@ -46,30 +47,13 @@ impl TileEdges {
     }
 
     /// Adds an edge.
+    #[inline(always)]
     pub fn push(&mut self, edge: &Edge) {
         let [p, q] = edge.planes.map(|plane| plane.to_array());
-        let (a, b, far) = (edge.a, edge.b, edge.far);
-        let values = [
-            a.x,
-            a.y,
-            a.z,
-            b.x,
-            b.y,
-            b.z,
-            p[0],
-            p[1],
-            p[2],
-            p[3],
-            q[0],
-            q[1],
-            q[2],
-            q[3],
-            edge.signs[0],
-            edge.signs[1],
-            far.x,
-            far.y,
-            far.z,
-        ];
+        let (a, b, far, [first, second]) = (edge.a, edge.b, edge.far, edge.signs);
+        let ends = [a.x, a.y, a.z, b.x, b.y, b.z];
+        let planes = [p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3]];
+        let values = ends.into_iter().chain(planes).chain([first, second, far.x, far.y, far.z]);
         self.has_far |= !far.is_nan();
         self.parts.iter_mut().zip(values).for_each(|(part, value)| part.push(value));
         self.count += 1;
@@ -79,6 +63,70 @@ impl TileEdges {
     pub fn pad(&mut self) {
         let padded = self.count.next_multiple_of(LANES);
         self.parts.iter_mut().for_each(|part| part.resize(padded, 0.0));
+    }
+
+    /// Takes over those of `edges` that `indices` name, or of them those that [`Beam`] lets through, and fills the last lanes.
+    #[inline(always)]
+    pub fn gather<S: Simd>(
+        &mut self,
+        _simd: S,
+        edges: &[Edge],
+        mut indices: impl Iterator<Item = u32>,
+        beam: Option<&Beam>,
+    ) {
+        self.clear();
+        let (mut chunk, mut ends) = ([0u32; LANES], [[0.0f32; LANES]; 6]);
+        loop {
+            let mut count = 0;
+            while count < LANES
+                && let Some(index) = indices.next()
+            {
+                let Edge { a, b, .. } = edges[index as usize];
+                for (part, value) in ends.iter_mut().zip([a.x, a.y, a.z, b.x, b.y, b.z]) {
+                    part[count] = value;
+                }
+                chunk[count] = index;
+                count += 1;
+            }
+            let outside = beam.map_or([false; LANES], |beam| beam.outside(&ends));
+            for (&index, _) in chunk[..count].iter().zip(&outside).filter(|(_, outside)| !**outside) {
+                self.push(&edges[index as usize]);
+            }
+            if count < LANES {
+                break;
+            }
+        }
+        self.pad();
+    }
+
+    /// Takes over those of `other` that `beam` lets through, and fills the last lanes.
+    #[inline(always)]
+    pub fn take_within<S: Simd>(&mut self, _simd: S, other: &Self, beam: &Beam) {
+        self.clear();
+        self.has_far = other.has_far;
+        // Without points seen past edges nothing asks for theirs.
+        let told = if other.has_far { 19 } else { 16 };
+        for first in (0..other.parts[0].len()).step_by(LANES) {
+            let mut ends = [[0.0; LANES]; 6];
+            for (to, from) in ends.iter_mut().zip(&other.parts) {
+                to.copy_from_slice(&from[first..first + LANES]);
+            }
+            let outside = beam.outside(&ends);
+            let (mut kept, mut count) = ([0usize; LANES], 0);
+            for (lane, &outside) in outside.iter().enumerate().take(other.count - first.min(other.count)) {
+                kept[count] = lane;
+                count += usize::from(!outside);
+            }
+            if count == 0 {
+                continue;
+            }
+            for (to, from) in self.parts.iter_mut().zip(&other.parts).take(told) {
+                let from = &from[first..first + LANES];
+                to.extend(kept[..count].iter().map(|&lane| from[lane]));
+            }
+            self.count += count;
+        }
+        self.pad();
     }
 
     /// The ends of an edge.
@@ -188,6 +236,20 @@ pub(crate) fn center_is_left(a: Vec3, b: Vec3) -> bool {
     line.z > 0.0 || (line.z == 0.0 && (line.x > 0.0 || (line.x == 0.0 && line.y > 0.0)))
 }
 
+/// Edges of one vector, cut, in (a, b, t).
+#[derive(Clone, Copy, Debug)]
+struct Crossings {
+    /// (a, b) of both ends.
+    a: [[f32; LANES]; 2],
+    b: [[f32; LANES]; 2],
+    /// a × b.
+    line: [[f32; LANES]; 3],
+    /// What crossing one on the way from the centre adds; 0 for an edge that does not lie over the light.
+    step: [f32; LANES],
+    /// Whether the centre lies left of it.
+    center_left: [bool; LANES],
+}
+
 /// Points of the light and what is counted at them; memory that is kept from receiver to receiver.
 #[derive(Debug, Default)]
 pub struct Counter {
@@ -196,8 +258,8 @@ pub struct Counter {
     ys: Vec<f32>,
     /// n(s) − n(c).
     counts: Vec<f32>,
-    /// m(e) of the edges that may lie over the light, 0 of the others.
-    marks: Vec<f32>,
+    /// The edges as the light's points are asked about them.
+    crossings: Vec<Crossings>,
     /// Edges that were cut and counted for the last receiver.
     pub counted: u32,
 }
@@ -242,22 +304,26 @@ impl Counter {
         self.counts.clear();
         self.counts.resize(self.xs.len(), 0.0);
         self.counted = 0;
-        self.mark(site, edges);
-        for (index, &mark) in self.marks[..edges.count].iter().enumerate() {
-            if mark == 0.0 {
-                continue;
-            }
-            if let Some([a, b]) = site.cut(edges.ends(index)) {
+        self.crossings.clear();
+        for first in (0..edges.count).step_by(LANES) {
+            self.crossings.push(crossings(site, edges, first));
+        }
+        for crossings in &self.crossings {
+            for lane in 0..LANES {
+                let step = crossings.step[lane];
+                if step == 0.0 {
+                    continue;
+                }
                 self.counted += 1;
-                let line = a.cross(b);
-                let [from, to] = edges.ends(index).map(|end| site.locate(end));
-                let center_left = center_is_left(from, to);
-                let step = mark * site.orientation * if center_left { -1.0 } else { 1.0 };
+                let [[ax, ay], [bx, by]] =
+                    [&crossings.a, &crossings.b].map(|end| [end[0][lane], end[1][lane]]);
+                let [line_x, line_y, line_z] = [0, 1, 2].map(|i| crossings.line[i][lane]);
+                let center_left = crossings.center_left[lane];
                 let taps = self.xs.chunks_exact(LANES).zip(self.ys.chunks_exact(LANES));
                 for ((xs, ys), counts) in taps.zip(self.counts.chunks_exact_mut(LANES)) {
                     for ((&x, &y), count) in xs.iter().zip(ys).zip(counts) {
-                        let sides = ((x * a.y - y * a.x) < 0.0) != ((x * b.y - y * b.x) < 0.0);
-                        let left = (line.x * x + line.y * y + line.z) > 0.0;
+                        let sides = ((x * ay - y * ax) < 0.0) != ((x * by - y * bx) < 0.0);
+                        let left = (line_x * x + line_y * y + line_z) > 0.0;
                         let crossed = sides & (left != center_left);
                         *count += if crossed { step } else { 0.0 };
                     }
@@ -265,51 +331,96 @@ impl Counter {
             }
         }
     }
+}
 
-    /// Finds the edges that may lie over the light: m(e) ≠ 0, not below the receiver's plane, and not beside the square
-    /// around the light. All tests are linear, so they are asked of the ends.
-    #[inline(always)]
-    fn mark(&mut self, site: &Site, edges: &TileEdges) {
-        let padded = edges.count.next_multiple_of(LANES);
-        self.marks.clear();
-        self.marks.resize(padded, 0.0);
-        let Site { point, normal, tolerance, .. } = *site;
-        let m = site.light_from_receiver.transpose();
-        for first in (0..padded).step_by(LANES) {
-            let part = |i: usize| &edges.parts[i][first..first + LANES];
-            let [ax, ay, az, bx, by, bz] = [0, 1, 2, 3, 4, 5].map(part);
-            let [px, py, pz, pd, qx, qy, qz, qd] = [6, 7, 8, 9, 10, 11, 12, 13].map(part);
-            let (p_sign, q_sign) = (part(14), part(15));
-            let [fx, fy, fz] = [16, 17, 18].map(part);
-            let marks = &mut self.marks[first..first + LANES];
-            for (lane, mark) in marks.iter_mut().enumerate() {
-                let side = |x: f32, y: f32, z: f32, d: f32, sign: f32| {
-                    let at = x * point.x + y * point.y + z * point.z + d;
-                    if at >= 0.0 { sign } else { -sign }
-                };
-                let multiplicity = side(px[lane], py[lane], pz[lane], pd[lane], p_sign[lane])
-                    + side(qx[lane], qy[lane], qz[lane], qd[lane], q_sign[lane]);
-                let a = Vec3::new(ax[lane] - point.x, ay[lane] - point.y, az[lane] - point.z);
-                let b = Vec3::new(bx[lane] - point.x, by[lane] - point.y, bz[lane] - point.z);
-                let dot = |axis: Vec3, v: Vec3| axis.x * v.x + axis.y * v.y + axis.z * v.z;
-                let above = dot(normal, a).max(dot(normal, b)) > tolerance;
-                let [au, av, at] = [m.x_axis, m.y_axis, m.z_axis].map(|axis| dot(axis, a));
-                let [bu, bv, bt] = [m.x_axis, m.y_axis, m.z_axis].map(|axis| dot(axis, b));
-                let beside = ((au > at) & (bu > bt))
-                    | ((-au > at) & (-bu > bt))
-                    | ((av > at) & (bv > bt))
-                    | ((-av > at) & (-bv > bt));
-                let mut counts = above & !beside;
-                if edges.has_far {
-                    let far = Vec3::new(fx[lane] - point.x, fy[lane] - point.y, fz[lane] - point.z);
-                    // NaN does not rise.
-                    let rises = dot(normal, far) > tolerance;
-                    counts &= !rises;
-                }
-                *mark = if counts { multiplicity } else { 0.0 };
-            }
+/// Finds of one vector of edges those that may lie over the light: m(e) ≠ 0, not below the receiver's plane, and not beside
+/// the square around the light (all tests are linear, so they are asked of the ends); and cuts them as [`Site::cut`] does.
+///
+/// Sums are in the order of [`Site::locate`] and [`center_is_left`], of which faces ask the same.
+#[inline(always)]
+fn crossings(site: &Site, edges: &TileEdges, first: usize) -> Crossings {
+    let Site { point, normal, tolerance, orientation, is_parallel, .. } = *site;
+    let m = site.light_from_receiver.transpose();
+    let part = |i: usize| &edges.parts[i][first..first + LANES];
+    let [ax, ay, az, bx, by, bz] = [0, 1, 2, 3, 4, 5].map(part);
+    let [px, py, pz, pd, qx, qy, qz, qd] = [6, 7, 8, 9, 10, 11, 12, 13].map(part);
+    let (p_sign, q_sign) = (part(14), part(15));
+    let mut all = Crossings {
+        a: [[0.0; LANES]; 2],
+        b: [[0.0; LANES]; 2],
+        line: [[0.0; LANES]; 3],
+        step: [0.0; LANES],
+        center_left: [false; LANES],
+    };
+    let mut counts = [false; LANES];
+    for lane in 0..LANES {
+        let from = [ax[lane] - point.x, ay[lane] - point.y, az[lane] - point.z];
+        let to = [bx[lane] - point.x, by[lane] - point.y, bz[lane] - point.z];
+        let heights = [dot(normal, from) - tolerance, dot(normal, to) - tolerance];
+        let mut a = [dot(m.x_axis, from), dot(m.y_axis, from), dot(m.z_axis, from)];
+        let mut b = [dot(m.x_axis, to), dot(m.y_axis, to), dot(m.z_axis, to)];
+        let beside = ((a[0] > a[2]) & (b[0] > b[2]))
+            | ((-a[0] > a[2]) & (-b[0] > b[2]))
+            | ((a[1] > a[2]) & (b[1] > b[2]))
+            | ((-a[1] > a[2]) & (-b[1] > b[2]));
+        let mut there = !beside;
+        let [x, y, z] = cross(a, b);
+        let center_left = (z > 0.0) | ((z == 0.0) & ((x > 0.0) | ((x == 0.0) & (y > 0.0))));
+        there &= keep(heights, &mut a, &mut b);
+        there &= keep([a[2], b[2]], &mut a, &mut b);
+        let before = [1.0 - a[2], 1.0 - b[2]];
+        there &= keep(if is_parallel { [1.0; 2] } else { before }, &mut a, &mut b);
+        for i in 0..2 {
+            (all.a[i][lane], all.b[i][lane]) = (a[i], b[i]);
+        }
+        for (all, line) in all.line.iter_mut().zip(cross(a, b)) {
+            all[lane] = line;
+        }
+        (all.center_left[lane], counts[lane]) = (center_left, there);
+    }
+    for lane in 0..LANES {
+        let side = |x: f32, y: f32, z: f32, d: f32, sign: f32| {
+            let at = x * point.x + y * point.y + z * point.z + d;
+            if at >= 0.0 { sign } else { -sign }
+        };
+        let multiplicity = side(px[lane], py[lane], pz[lane], pd[lane], p_sign[lane])
+            + side(qx[lane], qy[lane], qz[lane], qd[lane], q_sign[lane]);
+        let step = multiplicity * orientation * if all.center_left[lane] { -1.0 } else { 1.0 };
+        all.step[lane] = if counts[lane] { step } else { 0.0 };
+    }
+    if edges.has_far {
+        let [fx, fy, fz] = [16, 17, 18].map(part);
+        for lane in 0..LANES {
+            let far = [fx[lane] - point.x, fy[lane] - point.y, fz[lane] - point.z];
+            // NaN does not rise.
+            let rises = dot(normal, far) > tolerance;
+            all.step[lane] = if rises { 0.0 } else { all.step[lane] };
         }
     }
+    all
+}
+
+#[inline(always)]
+fn dot(axis: Vec3, v: [f32; 3]) -> f32 {
+    axis.x * v[0] + axis.y * v[1] + axis.z * v[2]
+}
+
+#[inline(always)]
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - b[1] * a[2], a[2] * b[0] - b[2] * a[0], a[0] * b[1] - b[0] * a[1]]
+}
+
+/// Cuts off where `by` is not above 0; false if nothing is left.
+#[inline(always)]
+fn keep(by: [f32; 2], a: &mut [f32; 3], b: &mut [f32; 3]) -> bool {
+    let below = by.map(|by| by <= 0.0);
+    let share = by[0] / (by[0] - by[1]);
+    for (a, b) in a.iter_mut().zip(b) {
+        let cut = *a + (*b - *a) * share;
+        *a = if below[0] { cut } else { *a };
+        *b = if below[1] { cut } else { *b };
+    }
+    !(below[0] & below[1])
 }
 
 #[cfg(test)]

@@ -6,9 +6,11 @@ use fearless_simd::{Level, Simd, dispatch};
 use gnomon_shadow_map::light_cone::LightCone;
 use gnomon_shadow_map::light_maps::Receiver;
 use rayon::prelude::*;
+use scene_core::geometry::Aabb;
 use scene_core::raster::{DepthOptions, Fragments, RasterScratch, render_fragments};
 use scene_core::{Light, Report, Scene};
 
+use crate::beam::Beam;
 use crate::coverage::{Counter, Site, TileEdges};
 use crate::distortion_map::{Farthest, distortion_map};
 #[cfg(feature = "gpu")]
@@ -46,13 +48,31 @@ pub fn draw_layers(
 /// What a thread keeps from tile to tile.
 #[derive(Default)]
 struct Thread {
-    edges: TileEdges,
-    /// The same edges by index.
+    /// Edges of the tile, and after them those of a block, of a part of that block, and so on.
+    edges: Vec<TileEdges>,
+    /// The tile's by index.
     indices: Vec<u32>,
+    /// The tile's receivers, and where their values go.
+    receivers: Vec<(u32, Receiver)>,
+    /// Blocks to come.
+    blocks: Vec<Block>,
     counter: Counter,
     /// Whether the counter's points are those of all receivers.
     has_points: bool,
 }
+
+/// Neighbouring receivers of a tile.
+struct Block {
+    receivers: std::ops::Range<usize>,
+    /// Where the edges are of the block that it is a part of.
+    part_of: Option<usize>,
+}
+
+/// Receivers of a block that is not cut again: to choose edges costs as much as asking some receivers about all of them.
+const FEW_RECEIVERS: usize = 8;
+
+/// Edges from which none are chosen: as many as two vectors have lanes.
+const FEW_EDGES: usize = 32;
 
 /// All stages of `shade`: V of each of `values.len()` receivers, which `site` knows.
 pub fn shade(
@@ -166,21 +186,63 @@ fn shade_tile<S: Simd>(
     thread: &mut Thread,
     site: &(impl Fn(usize) -> Result<Receiver, f32> + Sync),
 ) -> Vec<f32> {
-    thread.edges.clear();
-    thread.indices.clear();
-    for edge in map.of(tile.tile) {
-        thread.edges.push(&prepared.edges[edge as usize]);
-        thread.indices.push(edge);
+    let mut values = vec![0.0; receivers.len()];
+    thread.receivers.clear();
+    for (slot, &index) in receivers.iter().enumerate() {
+        match site(index as usize) {
+            Ok(receiver) => thread.receivers.push((slot as u32, receiver)),
+            Err(known) => values[slot] = known,
+        }
     }
-    thread.edges.pad();
+    let is_paper = prepared.variant == Variant::Paper;
+    if is_paper {
+        thread.indices.clear();
+        thread.indices.extend(map.of(tile.tile));
+    }
+    let is_chosen = prepared.skip && !is_paper;
+    if thread.edges.is_empty() {
+        thread.edges.push(TileEdges::default());
+    }
     let splats = Tile { prepared, view: tile.view };
-    receivers
-        .iter()
-        .map(|&index| match site(index as usize) {
-            Ok(receiver) => splats.answer(simd, &receiver, thread),
-            Err(known) => known,
-        })
-        .collect()
+    // Edges of the block that is at hand lie one place above those of the block that it is a part of.
+    thread.blocks.clear();
+    thread.blocks.push(Block { receivers: 0..thread.receivers.len(), part_of: None });
+    while let Some(Block { receivers, part_of }) = thread.blocks.pop() {
+        let held = &mut thread.receivers[receivers.clone()];
+        let bounds = Aabb::from_points(held.iter().map(|(_, receiver)| receiver.point - prepared.origin));
+        let hull = prepared.hull.as_ref().filter(|_| is_chosen);
+        let beam = || hull.and_then(|hull| Beam::new(&bounds, hull, prepared.origin));
+        let edges = match part_of {
+            None => {
+                thread.edges[0].gather(simd, &prepared.edges, map.of(tile.tile), beam().as_ref());
+                0
+            }
+            Some(edges) if thread.edges[edges].len() <= FEW_EDGES => edges,
+            Some(edges) => {
+                if thread.edges.len() == edges + 1 {
+                    thread.edges.push(TileEdges::default());
+                }
+                let (below, above) = thread.edges.split_at_mut(edges + 1);
+                beam().map_or(edges, |beam| {
+                    above[0].take_within(simd, &below[edges], &beam);
+                    edges + 1
+                })
+            }
+        };
+        if is_chosen && held.len() > FEW_RECEIVERS && thread.edges[edges].len() > FEW_EDGES {
+            let (middle, axis) = (held.len() / 2, bounds.size().max_position());
+            held.select_nth_unstable_by(middle, |(_, a), (_, b)| a.point[axis].total_cmp(&b.point[axis]));
+            let middle = receivers.start + middle;
+            thread.blocks.push(Block { receivers: middle..receivers.end, part_of: Some(edges) });
+            thread.blocks.push(Block { receivers: receivers.start..middle, part_of: Some(edges) });
+            continue;
+        }
+        for index in receivers {
+            let (slot, receiver) = thread.receivers[index];
+            values[slot as usize] = splats.answer(simd, &receiver, thread, edges);
+        }
+    }
+    values
 }
 
 /// What a tile's receivers are answered from.
@@ -191,8 +253,8 @@ struct Tile<'p, 'a> {
 
 impl Tile<'_, '_> {
     #[inline(always)]
-    fn answer<S: Simd>(&self, simd: S, receiver: &Receiver, thread: &mut Thread) -> f32 {
-        let prepared = self.prepared;
+    fn answer<S: Simd>(&self, simd: S, receiver: &Receiver, thread: &mut Thread, edges: usize) -> f32 {
+        let (prepared, edges) = (self.prepared, &thread.edges[edges]);
         let light = &prepared.base.light;
         let (site, cone) = site_of(prepared, receiver);
         let at_center = before_center(prepared, self.view, receiver, &site);
@@ -206,10 +268,10 @@ impl Tile<'_, '_> {
         let taps = prepared.points.len();
         match prepared.variant {
             Variant::Ddoc | Variant::ImageEdges => {
-                thread.counter.visible(simd, &site, &thread.edges, at_center, taps)
+                thread.counter.visible(simd, &site, edges, at_center, taps)
             }
-            Variant::Smoothies => outer::visible(Kept::Nearest, &site, &thread.edges, hard),
-            Variant::PenumbraMap => outer::visible(Kept::Darkest, &site, &thread.edges, hard),
+            Variant::Smoothies => outer::visible(Kept::Nearest, &site, edges, hard),
+            Variant::PenumbraMap => outer::visible(Kept::Darkest, &site, edges, hard),
             Variant::Paper => {
                 let edges = thread.indices.iter().map(|&edge| (edge, &prepared.edges[edge as usize]));
                 let (image, points) = (&prepared.layers[self.view].image, &prepared.points);

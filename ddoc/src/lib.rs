@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod beam;
 pub mod cells;
 pub mod coverage;
 pub mod cpu;
@@ -59,6 +60,8 @@ pub struct PreparedDdoc<'a> {
     /// Where edges are counted from.
     origin: Vec3,
     edges: Vec<Edge>,
+    /// Those from here on are outlines of the map.
+    first_outline: usize,
     /// Bounds of the light; none of a sun that is too wide.
     hull: Option<LightHull>,
     /// Points of the light as shares of it.
@@ -109,7 +112,7 @@ impl Ddoc {
         let bounds = casters.drawn.iter().fold(Aabb::EMPTY, |all, object| all.union(object.bounds));
         let origin = if bounds.is_empty() { Vec3::ZERO } else { bounds.center() };
         let hull = LightHull::of(light);
-        let edges = report.time("prepare.silhouettes", |report| {
+        let (edges, first_outline) = report.time("prepare.silhouettes", |report| {
             let mut edges = match params.variant {
                 Variant::ImageEdges | Variant::Paper => Vec::new(),
                 Variant::Ddoc => object_edges(scene, &casters.drawn, origin, hull.as_ref(), center, report)?,
@@ -121,6 +124,7 @@ impl Ddoc {
                     edges
                 }
             };
+            let first_outline = edges.len();
             for layers in &mut layers {
                 let in_map = || Discontinuities::new(scene, layers, center, tolerance);
                 let outlines = match params.variant {
@@ -134,7 +138,7 @@ impl Ddoc {
                 layers.set_outlines(&outlines, edges.len() as u32, origin);
                 edges.extend(outlines);
             }
-            Ok::<_, TopologyError>(edges)
+            Ok::<_, TopologyError>((edges, first_outline))
         })?;
         report.bytes += layers.iter().map(|layers| layers.bytes() as u64).sum::<u64>()
             + faces.iter().map(|faces| faces.lists().bytes() as u64).sum::<u64>()
@@ -149,7 +153,8 @@ impl Ddoc {
         };
         let points = light_points::light_points(light, params.taps, params.seed);
         let DdocParams { variant, skip, .. } = *params;
-        let prepared = PreparedDdoc { base, faces, layers, origin, edges, hull, points, variant, skip };
+        let prepared =
+            PreparedDdoc { base, faces, layers, origin, edges, first_outline, hull, points, variant, skip };
         Ok((prepared, report))
     }
 }

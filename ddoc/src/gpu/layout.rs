@@ -59,6 +59,12 @@ pub struct DdocUniform {
     pub kind: u32,
     /// 1 where the nearest fragment alone counts.
     pub single: u32,
+    /// The first edge that is an outline of the map.
+    pub first_outline: u32,
+    /// Where the vectors of outlines begin.
+    pub outlines: u32,
+    /// Zero.
+    pub padding: [u32; 2],
     /// Views and their tables.
     pub views: [ViewTable; MOST_VIEWS],
     /// a of the points.
@@ -74,7 +80,7 @@ pub struct Tables {
     pub uniform: DdocUniform,
     /// Lists and where they begin.
     pub words: Vec<u32>,
-    /// Six vectors an edge.
+    /// Four vectors an edge, then two an outline.
     pub edges: Vec<[f32; 4]>,
 }
 
@@ -90,13 +96,15 @@ impl Tables {
                 Variant::PenumbraMap => 2,
                 Variant::Ddoc | Variant::ImageEdges | Variant::Paper => 0,
             },
+            first_outline: prepared.first_outline as u32,
+            outlines: 4 * prepared.edges.len() as u32,
             ..Zeroable::zeroed()
         };
         uniform.taps = prepared.points.len().min(uniform.xs.len()) as u32;
         for (index, &Vec2 { x, y }) in prepared.points.iter().enumerate().take(uniform.taps as usize) {
             (uniform.xs[index], uniform.ys[index]) = (x, y);
         }
-        let (mut words, mut edges) = (Vec::new(), edge_vectors(&prepared.edges));
+        let (mut words, mut edges) = (Vec::new(), edge_vectors(&prepared.edges, prepared.first_outline));
         let views = prepared.layers.iter().zip(&prepared.faces).zip(splats);
         for (into, ((layers, faces), splats)) in uniform.views.iter_mut().zip(views) {
             let (faces, grid) = (faces.lists(), splats.grid());
@@ -118,7 +126,9 @@ impl Tables {
                 (into.fragments, into.outlines) = append_layers(&mut words, layers);
                 for outline in layers.outlines() {
                     let [[ax, ay], [bx, by]] = outline.ends;
-                    edges[6 * outline.edge as usize + 5] = [ax, ay, bx, by].map(|at| at as f32);
+                    let place =
+                        4 * prepared.edges.len() + 2 * (outline.edge as usize - prepared.first_outline);
+                    edges[place + 1] = [ax, ay, bx, by].map(|at| at as f32);
                 }
             }
         }
@@ -146,23 +156,26 @@ fn append_layers(words: &mut Vec<u32>, layers: &Layers) -> (u32, u32) {
     (fragments, append(words, squares.first(), edges))
 }
 
-/// Edges as `edge_at` of `edges.wesl` reads them: an end and a sign, twice; two planes; what is seen past the edge beside
-/// m(e) as the centre sees it, plus 8 if anything is; and, of an outline, both ends in the image.
-fn edge_vectors(edges: &[Edge]) -> Vec<[f32; 4]> {
-    let vectors = |edge: &Edge| {
-        let has_far = !edge.far.is_nan();
-        let far = if has_far { edge.far } else { Vec3::ZERO };
-        let told = f32::from(edge.from_center) + if has_far { 8.0 } else { 0.0 };
+/// Edges as `edge_at` of `edges.wesl` reads them: an end and a sign, twice, and two planes. Then those from `first_outline` on
+/// as `outline_at` does: what is seen past the edge beside m(e) as the centre sees it, plus 8 if anything is, and both ends in
+/// the image, which are not known here.
+fn edge_vectors(edges: &[Edge], first_outline: usize) -> Vec<[f32; 4]> {
+    let of_edge = |edge: &Edge| {
         [
             edge.a.extend(edge.signs[0]).to_array(),
             edge.b.extend(edge.signs[1]).to_array(),
             edge.planes[0].to_array(),
             edge.planes[1].to_array(),
-            far.extend(told).to_array(),
-            [0.0; 4],
         ]
     };
-    edges.iter().flat_map(vectors).collect()
+    let of_outline = |edge: &Edge| {
+        let has_far = !edge.far.is_nan();
+        let far = if has_far { edge.far } else { Vec3::ZERO };
+        let told = f32::from(edge.from_center) + if has_far { 8.0 } else { 0.0 };
+        [far.extend(told).to_array(), [0.0; 4]]
+    };
+    let outlines = edges.iter().skip(first_outline).flat_map(of_outline);
+    edges.iter().flat_map(of_edge).chain(outlines).collect()
 }
 
 #[cfg(test)]
@@ -196,7 +209,7 @@ mod tests {
             DdocUniform,
             SHADE,
             "Ddoc",
-            [origin, taps, tolerance, count, kind, single, views, xs, ys]
+            [origin, taps, tolerance, count, kind, single, first_outline, outlines, padding, views, xs, ys]
         );
     }
 

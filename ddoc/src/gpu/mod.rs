@@ -28,9 +28,14 @@ use crate::params::Variant;
 use crate::{Ddoc, DdocParams, cpu};
 use layout::{MOST_VIEWS, Tables};
 
-/// Edges and faces over one tile that a pixel may go through: Mesa's software drivers end all loops of a pixel after 65,535
-/// turns in sum, and a wrong image is worse than none. What else takes turns is far less than the rest.
-const MOST_OVER_TILE: u32 = 60_000;
+/// Turns of loops that a pixel may take: Mesa's software drivers end all loops of a pixel after 65,535 turns in sum, and a wrong
+/// image is worse than none. What takes turns beside edges and faces is far less than the rest.
+const MOST_TURNS: u32 = 60_000;
+
+/// Edges that the shader looks at, edges that it counts and faces that it asks in a turn.
+const LOOKED_AT_ONCE: u32 = 16;
+const COUNTED_AT_ONCE: u32 = 4;
+const FACES_AT_ONCE: u32 = 4;
 
 /// Points of the light that the shader counts at once, `VECTORS` of four.
 const POINTS_AT_ONCE: u32 = 64;
@@ -133,8 +138,14 @@ impl DdocOnGpu {
         });
         let rounds = (prepared.points.len() as u32).div_ceil(POINTS_AT_ONCE);
         for (splats, faces) in splats.iter().zip(&prepared.faces) {
-            let turns = splats.longest().saturating_mul(rounds).saturating_add(faces.lists().longest());
-            GpuError::within("edges and faces over one tile", turns, MOST_OVER_TILE)?;
+            // At worst every edge that is looked at is counted.
+            let edges = splats.longest();
+            let turns = match prepared.variant {
+                Variant::Smoothies | Variant::PenumbraMap => edges,
+                _ => (edges / LOOKED_AT_ONCE + edges / COUNTED_AT_ONCE).saturating_mul(rounds),
+            };
+            let turns = turns.saturating_add(faces.lists().longest() / FACES_AT_ONCE);
+            GpuError::within("turns for edges and faces over one tile", turns, MOST_TURNS)?;
         }
         let own = report.time("prepare.upload", |_| {
             let tables = Tables::new(&prepared, &splats);

@@ -1,0 +1,174 @@
+//! Which edges may lie between a block of receivers and the light.
+//!
+//! A tile of the light's image holds receivers at many depths, and edges for all of them. A block of neighbours takes from
+//! its tile's edges those that reach into its beam, the union of all rays from the box around the block through the light:
+//! a receiver is then asked about edges that lie over the light, or nearly.
+//!
+//! # The planes
+//! For a direction d across the beam's axis w the plane with the normal n = d + λ·w holds the beam on its inner side if no
+//! way from a corner b of the box to a corner l of the light's hull leads outwards, n·(l − b) ≤ 0: λ is the least of
+//! −d·(l − b)/(w·(l − b)), and the plane goes through the box's outermost corner. An edge whose ends both lie outside of one
+//! plane meets no ray. What is left out could not have counted: it lies beside the light as every receiver of the block
+//! sees it.
+//!
+//! # Rounding
+//! λ is lowered by 2⁻¹⁶ and planes are moved outwards by 2⁻¹⁷ of the largest coordinate: products of two f32 and their
+//! sums are good to 2⁻²² of their terms, here and where a receiver asks.
+
+use glam::{Vec3, Vec4};
+use scene_core::geometry::Aabb;
+use scene_core::light::{LightHull, LightPoint};
+
+use crate::coverage::LANES;
+
+/// λ is lowered by this, as a share of the axis' length.
+const TILT: f32 = 1.0 / 65_536.0;
+
+/// Planes are moved outwards by this share of the largest coordinate.
+const SHIFT: f32 = 1.0 / 131_072.0;
+
+/// The planes around a beam.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beam {
+    /// n·x + d > 0 outside, x from the origin of edges.
+    pub planes: [Vec4; 5],
+}
+
+impl Beam {
+    /// Over receivers in `bounds`, which is relative to `origin`. `None` where rays lead away from the light's middle, as
+    /// around a receiver that stands beside its light: nothing is known of such a beam.
+    pub fn new(bounds: &Aabb, hull: &LightHull, origin: Vec3) -> Option<Self> {
+        let corners: [Vec3; 8] = std::array::from_fn(|i| {
+            let pick = |axis: usize| if i >> axis & 1 == 1 { bounds.max[axis] } else { bounds.min[axis] };
+            Vec3::new(pick(0), pick(1), pick(2))
+        });
+        let middle = bounds.center();
+        let lights = hull.corners();
+        let way = |from: Vec3, to: LightPoint| match to {
+            LightPoint::At(place) => (place - origin) - from,
+            LightPoint::Towards(direction) => direction,
+        };
+        let sum: Vec3 = lights.iter().map(|&light| way(middle, light).normalize_or_zero()).sum();
+        let axis = sum.try_normalize()?;
+        let [u, v] = sides(lights, axis);
+        // The least way along the axis; all ways must lead forwards.
+        let mut steepest = [f32::NEG_INFINITY; 4];
+        let directions = [u, -u, v, -v];
+        for &light in lights {
+            for corner in corners {
+                let way = way(corner, light);
+                let forwards = axis.dot(way);
+                if forwards.is_nan() || forwards <= way.length() * TILT {
+                    return None;
+                }
+                for (steepest, direction) in steepest.iter_mut().zip(directions) {
+                    *steepest = steepest.max(direction.dot(way) / forwards);
+                }
+                if matches!(light, LightPoint::Towards(_)) {
+                    break;
+                }
+            }
+        }
+        let largest = bounds.magnitude().max(origin.abs().max_element());
+        let plane = |normal: Vec3| {
+            let normal = normal.normalize();
+            let outermost =
+                corners.iter().map(|corner| normal.dot(*corner)).fold(f32::NEG_INFINITY, f32::max);
+            normal.extend(-(outermost + largest * SHIFT))
+        };
+        let mut planes = [plane(-axis); 5];
+        for i in 0..4 {
+            planes[i] = plane(directions[i] - axis * (steepest[i] + TILT));
+        }
+        planes.iter().all(|plane| plane.is_finite()).then_some(Self { planes })
+    }
+}
+
+impl Beam {
+    /// Which of a vector of edges lie outside, given x, y and z of one end and of the other.
+    #[inline(always)]
+    pub(crate) fn outside(&self, [ax, ay, az, bx, by, bz]: &[[f32; LANES]; 6]) -> [bool; LANES] {
+        let mut outside = [false; LANES];
+        for plane in &self.planes {
+            for lane in 0..LANES {
+                let a = plane.x * ax[lane] + plane.y * ay[lane] + plane.z * az[lane] + plane.w;
+                let b = plane.x * bx[lane] + plane.y * by[lane] + plane.z * bz[lane] + plane.w;
+                outside[lane] |= (a > 0.0) & (b > 0.0);
+            }
+        }
+        outside
+    }
+}
+
+/// Two directions across `axis`: along the normals of the planes through the light's own sides where it has some.
+fn sides(lights: &[LightPoint], axis: Vec3) -> [Vec3; 2] {
+    let place = |light: LightPoint| match light {
+        LightPoint::At(place) | LightPoint::Towards(place) => place,
+    };
+    if let [a, b, c, _] = *lights {
+        let (a, b, c) = (place(a), place(b), place(c));
+        let pair = [(c - b).cross(axis), (b - a).cross(axis)].map(|side| side.try_normalize());
+        if let [Some(u), Some(v)] = pair {
+            return [u, v];
+        }
+    }
+    let (u, v) = axis.any_orthonormal_pair();
+    [u, v]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scene_core::Light;
+    use scene_core::light::sampling::{LightView, SampleKey, low_discrepancy};
+
+    /// No ray from the box to the light leaves the beam; what lies beside, or behind the receivers, does.
+    #[test]
+    fn a_beam_holds_every_ray() {
+        let origin = Vec3::new(0.5, -1.0, 0.25);
+        let bounds = Aabb { min: Vec3::new(-0.1, 0.0, -0.2), max: Vec3::new(0.1, 0.3, 0.2) };
+        let center = Vec3::new(1.0, 5.0, 2.0);
+        let lights = [
+            Light::Rect { center, half_u: Vec3::new(0.5, 0.1, 0.0), half_v: Vec3::new(0.0, 0.2, 0.7) },
+            Light::Disk { center, normal: Vec3::new(0.1, -1.0, 0.2), radius: 0.4 },
+            Light::Sphere { center, radius: 0.6 },
+            Light::Directional { direction: -center, angular_radius: 0.2 },
+        ];
+        for light in lights {
+            let hull = LightHull::of(&light).unwrap();
+            let beam = Beam::new(&bounds, &hull, origin).unwrap();
+            let outside = |point: Vec3| beam.planes.iter().any(|plane| plane.dot(point.extend(1.0)) > 0.0);
+            let mut points = [LightPoint::At(Vec3::ZERO); 64];
+            for i in 0..27 {
+                let at = Vec3::new((i % 3) as f32, (i / 3 % 3) as f32, (i / 9) as f32) * 0.5;
+                let receiver = bounds.min + at * bounds.size();
+                low_discrepancy(
+                    &LightView::new(&light, receiver + origin),
+                    SampleKey::new(1, i),
+                    &mut points,
+                );
+                for point in points {
+                    let (way, _) = point.ray_from(receiver + origin);
+                    for share in [0.0, 0.1, 0.5, 1.0] {
+                        assert!(!outside(receiver + way * share), "{light:?}, {receiver}, {way}");
+                    }
+                }
+            }
+            let (axis, _) = light.center().ray_from(bounds.center() + origin);
+            let axis = axis.normalize();
+            let (u, _) = axis.any_orthonormal_pair();
+            for turn in [0.0f32, 1.0, 2.0, 3.0, 4.0, 5.0] {
+                let across = glam::Quat::from_axis_angle(axis, turn) * u;
+                assert!(outside(bounds.center() + axis + across * 1.5), "{light:?}, {turn}");
+            }
+            assert!(outside(bounds.center() - axis));
+        }
+    }
+
+    #[test]
+    fn around_its_light_there_is_none() {
+        let hull = LightHull::of(&Light::Sphere { center: Vec3::ZERO, radius: 1.0 }).unwrap();
+        let bounds = Aabb { min: Vec3::splat(-2.0), max: Vec3::splat(2.0) };
+        assert_eq!(Beam::new(&bounds, &hull, Vec3::ZERO), None);
+    }
+}
