@@ -51,11 +51,15 @@ impl TileEdges {
     pub fn push(&mut self, edge: &Edge) {
         let [p, q] = edge.planes.map(|plane| plane.to_array());
         let (a, b, far, [first, second]) = (edge.a, edge.b, edge.far, edge.signs);
-        let ends = [a.x, a.y, a.z, b.x, b.y, b.z];
-        let planes = [p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3]];
-        let values = ends.into_iter().chain(planes).chain([first, second, far.x, far.y, far.z]);
+        #[rustfmt::skip]
+        let values = [
+            a.x, a.y, a.z, b.x, b.y, b.z, p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3], first, second,
+            far.x, far.y, far.z,
+        ];
         self.has_far |= !far.is_nan();
-        self.parts.iter_mut().zip(values).for_each(|(part, value)| part.push(value));
+        for (part, value) in self.parts.iter_mut().zip(values) {
+            part.push(value);
+        }
         self.count += 1;
     }
 
@@ -106,14 +110,17 @@ impl TileEdges {
         self.has_far = other.has_far;
         // Without points seen past edges nothing asks for theirs.
         let told = if other.has_far { 19 } else { 16 };
-        for first in (0..other.parts[0].len()).step_by(LANES) {
+        let padded = other.parts[0].len();
+        // A vector is written whole wherever those before it ended.
+        self.parts.iter_mut().for_each(|part| part.resize(padded + LANES, 0.0));
+        for first in (0..padded).step_by(LANES) {
             let mut ends = [[0.0; LANES]; 6];
             for (to, from) in ends.iter_mut().zip(&other.parts) {
                 to.copy_from_slice(&from[first..first + LANES]);
             }
             let outside = beam.outside(&ends);
-            let (mut kept, mut count) = ([0usize; LANES], 0);
-            for (lane, &outside) in outside.iter().enumerate().take(other.count - first.min(other.count)) {
+            let (mut kept, mut count) = ([0u8; LANES], 0);
+            for (lane, &outside) in (0u8..).zip(&outside).take(other.count - first.min(other.count)) {
                 kept[count] = lane;
                 count += usize::from(!outside);
             }
@@ -121,11 +128,17 @@ impl TileEdges {
                 continue;
             }
             for (to, from) in self.parts.iter_mut().zip(&other.parts).take(told) {
-                let from = &from[first..first + LANES];
-                to.extend(kept[..count].iter().map(|&lane| from[lane]));
+                let mut vector = [0.0; LANES];
+                vector.copy_from_slice(&from[first..first + LANES]);
+                let to = &mut to[self.count..self.count + LANES];
+                for (to, &lane) in to.iter_mut().zip(&kept) {
+                    *to = vector[usize::from(lane) % LANES];
+                }
             }
             self.count += count;
         }
+        let count = self.count;
+        self.parts.iter_mut().for_each(|part| part.truncate(count));
         self.pad();
     }
 

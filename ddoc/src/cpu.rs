@@ -21,7 +21,7 @@ use crate::light_image::LightImage;
 use crate::outer::{self, Kept};
 use crate::params::Variant;
 use crate::silhouettes::Edge;
-use crate::tiles::{TileReceivers, Tiles};
+use crate::tiles::Tiles;
 use crate::{PreparedDdoc, paper};
 
 /// `prepare.map`: every face of `casters` over every texel's centre, a view each.
@@ -54,6 +54,9 @@ struct Thread {
     indices: Vec<u32>,
     /// The tile's receivers, and where their values go.
     receivers: Vec<(u32, Receiver)>,
+    /// The tile, counted from 1, that an edge was last looked up for.
+    seen: Vec<u32>,
+    turn: u32,
     /// Blocks to come.
     blocks: Vec<Block>,
     counter: Counter,
@@ -162,13 +165,17 @@ fn penumbra(
     values: &mut [f32],
     site: &(impl Fn(usize) -> Result<Receiver, f32> + Sync),
 ) {
-    let (sorted, ranges) = tiles.sorted(|view, tile| !maps[view].is_clear(tile));
-    let level = Level::new();
+    // Edges are looked up once for many receivers where each block of them then chooses its own.
+    let is_chosen = prepared.skip && prepared.variant != Variant::Paper;
+    let level = if is_chosen { maps.first().map_or(0, |map| (map.grid().levels() - 1).min(1)) } else { 0 };
+    let (sorted, ranges) = tiles.sorted(level, |view, tile| !maps[view].is_clear(tile));
+    let simd_level = Level::new();
     let parts: Vec<Vec<f32>> = ranges
         .par_iter()
         .map_init(Thread::default, |thread, tile| {
             let receivers = &sorted[tile.range.clone()];
-            dispatch!(level, simd => shade_tile(simd, prepared, &maps[tile.view], tile, receivers, thread, site))
+            let splats = Tile { prepared, view: tile.view, map: &maps[tile.view], level, tile: tile.tile };
+            dispatch!(simd_level, simd => shade_tile(simd, &splats, receivers, thread, site))
         })
         .collect();
     for (&index, v) in sorted.iter().zip(parts.iter().flatten()) {
@@ -179,13 +186,12 @@ fn penumbra(
 #[inline(always)]
 fn shade_tile<S: Simd>(
     simd: S,
-    prepared: &PreparedDdoc<'_>,
-    map: &TileLists,
-    tile: &TileReceivers,
+    splats: &Tile<'_, '_>,
     receivers: &[u32],
     thread: &mut Thread,
     site: &(impl Fn(usize) -> Result<Receiver, f32> + Sync),
 ) -> Vec<f32> {
+    let prepared = splats.prepared;
     let mut values = vec![0.0; receivers.len()];
     thread.receivers.clear();
     for (slot, &index) in receivers.iter().enumerate() {
@@ -197,13 +203,14 @@ fn shade_tile<S: Simd>(
     let is_paper = prepared.variant == Variant::Paper;
     if is_paper {
         thread.indices.clear();
-        thread.indices.extend(map.of(tile.tile));
+        thread.indices.extend(splats.map.of(splats.tile));
     }
     let is_chosen = prepared.skip && !is_paper;
+    thread.seen.resize(prepared.edges.len(), 0);
+    thread.turn += 1;
     if thread.edges.is_empty() {
         thread.edges.push(TileEdges::default());
     }
-    let splats = Tile { prepared, view: tile.view };
     // Edges of the block that is at hand lie one place above those of the block that it is a part of.
     thread.blocks.clear();
     thread.blocks.push(Block { receivers: 0..thread.receivers.len(), part_of: None });
@@ -214,7 +221,10 @@ fn shade_tile<S: Simd>(
         let beam = || hull.and_then(|hull| Beam::new(&bounds, hull, prepared.origin));
         let edges = match part_of {
             None => {
-                thread.edges[0].gather(simd, &prepared.edges, map.of(tile.tile), beam().as_ref());
+                let (seen, turn) = (&mut thread.seen, thread.turn);
+                let indices = splats.map.of_all_within(splats.level, splats.tile);
+                let new = indices.filter(|&index| std::mem::replace(&mut seen[index as usize], turn) != turn);
+                thread.edges[0].gather(simd, &prepared.edges, new, beam().as_ref());
                 0
             }
             Some(edges) if thread.edges[edges].len() <= FEW_EDGES => edges,
@@ -249,6 +259,10 @@ fn shade_tile<S: Simd>(
 struct Tile<'p, 'a> {
     prepared: &'p PreparedDdoc<'a>,
     view: usize,
+    map: &'p TileLists,
+    /// The grid that receivers are sorted by, and the tile of it.
+    level: u32,
+    tile: u32,
 }
 
 impl Tile<'_, '_> {

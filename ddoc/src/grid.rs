@@ -234,6 +234,29 @@ impl TileLists {
         })
     }
 
+    /// What lies over any part of a tile of the grid of `level`; some of it more than once.
+    pub fn of_all_within(&self, level: u32, tile: u32) -> impl Iterator<Item = u32> + '_ {
+        let side = self.grid.tiles_at(level);
+        let (column, row) = (tile % side, tile / side);
+        (0..self.grid.levels).flat_map(move |at_level| {
+            let side = self.grid.tiles_at(at_level);
+            // Tiles of finer grids within it, or the one of a coarser grid that holds it.
+            let range = |at: u32| match level.checked_sub(at_level) {
+                Some(finer) => (at << (RATIO * finer))..((at + 1) << (RATIO * finer)).min(side),
+                None => {
+                    let held = at >> (RATIO * (at_level - level));
+                    held..held + 1
+                }
+            };
+            let columns = range(column);
+            range(row).flat_map(move |row| {
+                let first = self.grid.first_of(at_level) + (row * side) as usize;
+                let lists = first + columns.start as usize..first + columns.end as usize;
+                self.all[self.first[lists.start] as usize..self.first[lists.end] as usize].iter().copied()
+            })
+        })
+    }
+
     /// How much lies over the fullest tile of the finest grid, what the tiles above it hold included.
     pub fn longest(&self) -> u32 {
         let held = |tile: usize| self.first[tile + 1] - self.first[tile];
@@ -300,6 +323,31 @@ mod tests {
         assert_eq!(lists.longest(), 3);
         let longest = (0..64 * 64).map(|tile| lists.of(tile).count()).max();
         assert_eq!(longest, Some(3));
+    }
+
+    #[test]
+    fn a_coarse_tile_has_what_its_fine_ones_have() {
+        let grid = Grid::of_texels(64);
+        let lists = TileLists::new(grid, 200, |index, enter| {
+            let at = |prime: usize| (index * prime % 64) as f32;
+            let min = Vec2::new(at(7), at(23));
+            grid.each_tile(Bounds { min, max: min + at(11) * 0.5 }, enter);
+        });
+        for level in 0..grid.levels() {
+            for tile in 0..grid.tiles_at(level) * grid.tiles_at(level) {
+                let (side, shift) = (grid.tiles_at(level), RATIO * level);
+                let fine = (0..64 * 64).filter(|fine| {
+                    (fine % 64) >> shift == tile % side && (fine / 64) >> shift == tile / side
+                });
+                let mut expected: Vec<u32> = fine.flat_map(|fine| lists.of(fine)).collect();
+                let mut found: Vec<u32> = lists.of_all_within(level, tile).collect();
+                for all in [&mut expected, &mut found] {
+                    all.sort_unstable();
+                    all.dedup();
+                }
+                assert_eq!(found, expected, "{tile} of {level}");
+            }
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use gnomon_shadow_map::light_maps::Receiver;
 use rayon::prelude::*;
 
 use crate::distortion_map::Farthest;
-use crate::grid::Grid;
+use crate::grid::{Grid, RATIO};
 use crate::light_image::LightImage;
 
 /// Of what needs no tile.
@@ -23,6 +23,7 @@ pub struct Tiles {
     /// The farthest receivers, a view each.
     pub farthest: Vec<Farthest>,
     per_view: u32,
+    grid: Grid,
 }
 
 /// Receivers of one tile.
@@ -30,7 +31,7 @@ pub struct Tiles {
 pub struct TileReceivers {
     /// The view.
     pub view: usize,
-    /// The tile of its finest grid.
+    /// The tile of the grid that they are sorted by.
     pub tile: u32,
     /// Indices of receivers, where they begin and end among all that are sorted.
     pub range: std::ops::Range<usize>,
@@ -77,7 +78,7 @@ impl Tiles {
             }
         });
         farthest.iter().for_each(Farthest::finish);
-        Self { of, farthest, per_view }
+        Self { of, farthest, per_view, grid }
     }
 
     /// View and tile of a receiver; `None` if its V is known.
@@ -87,15 +88,26 @@ impl Tiles {
         (of != NONE).then(|| ((of / self.per_view) as usize, of % self.per_view))
     }
 
-    /// The receivers whose tile `takes` chooses, sorted by tile; in a tile in their own order.
-    pub fn sorted(&self, takes: impl Fn(usize, u32) -> bool) -> (Vec<u32>, Vec<TileReceivers>) {
-        let tiles = self.farthest.len() * self.per_view as usize;
-        let takes_tile: Vec<bool> = (0..tiles as u32)
-            .map(|tile| takes((tile / self.per_view) as usize, tile % self.per_view))
+    /// The receivers whose tile of the finest grid `takes` chooses, sorted by tiles of the grid of `level`; in a tile in
+    /// their own order.
+    pub fn sorted(&self, level: u32, takes: impl Fn(usize, u32) -> bool) -> (Vec<u32>, Vec<TileReceivers>) {
+        let (side, side_above) = (self.grid.tiles(), self.grid.tiles_at(level));
+        let per_view = side_above * side_above;
+        // Of each tile of the finest grid the one above it.
+        let above: Vec<u32> = (0..self.farthest.len() as u32 * self.per_view)
+            .map(|of| {
+                let (view, tile) = (of / self.per_view, of % self.per_view);
+                if !takes(view as usize, tile) {
+                    return NONE;
+                }
+                let [column, row] = [tile % side, tile / side].map(|at| at >> (RATIO * level));
+                view * per_view + row * side_above + column
+            })
             .collect();
+        let tiles = self.farthest.len() * per_view as usize;
         let counts: Vec<AtomicU32> = (0..=tiles).map(|_| AtomicU32::new(0)).collect();
-        let chosen = |of: u32| of != NONE && takes_tile[of as usize];
-        self.of.par_iter().filter(|&&of| chosen(of)).for_each(|&of| {
+        let chosen = |of: u32| if of == NONE { NONE } else { above[of as usize] };
+        self.of.par_iter().map(|&of| chosen(of)).filter(|&of| of != NONE).for_each(|of| {
             counts[of as usize + 1].fetch_add(1, Ordering::Relaxed);
         });
         let mut first: Vec<u32> = counts.into_iter().map(AtomicU32::into_inner).collect();
@@ -106,16 +118,19 @@ impl Tiles {
         }
         let mut cursor = first.clone();
         let mut sorted = vec![0; sum as usize];
-        for (index, &of) in self.of.iter().enumerate().filter(|(_, of)| chosen(**of)) {
-            let at = &mut cursor[of as usize];
-            sorted[*at as usize] = index as u32;
-            *at += 1;
+        for (index, &of) in self.of.iter().enumerate() {
+            let of = chosen(of);
+            if of != NONE {
+                let at = &mut cursor[of as usize];
+                sorted[*at as usize] = index as u32;
+                *at += 1;
+            }
         }
         let ranges = (0..tiles)
             .filter(|&tile| first[tile] < first[tile + 1])
             .map(|tile| TileReceivers {
-                view: tile / self.per_view as usize,
-                tile: tile as u32 % self.per_view,
+                view: tile / per_view as usize,
+                tile: tile as u32 % per_view,
                 range: first[tile] as usize..first[tile + 1] as usize,
             })
             .collect();

@@ -3,29 +3,43 @@
 
 use std::fmt::Write;
 
-use glam::{Affine3A, Vec3};
 use gnomon_ddoc::{Ddoc, DdocParams, Variant};
+use gnomon_shadow_map::{ShadowMap, ShadowMapParams, Variant as MapVariant};
 use scene_core::bvh::Bvh;
-use scene_core::geometry::ObjectFlags;
 use scene_core::reference::{self, ReferenceSettings, no_progress};
-use scene_core::{Camera, Light, Scene, TriangleMesh, VisibilityImage, metrics, raster, scenes};
+use scene_core::technique::{ShadowQuery, ShadowTechnique};
+use scene_core::{Camera, Light, Scene, VisibilityImage, metrics, raster, scenes};
+
+#[path = "../examples/artefacts/mod.rs"]
+mod artefacts;
 
 /// Errors of variants with defaults, against 64 rays a pixel.
 fn errors(scene: &Scene, light: &Light, camera: &Camera, variants: &[Variant]) -> Vec<metrics::Errors> {
+    let mut techniques: Vec<Box<dyn ShadowTechnique>> = Vec::new();
+    for &variant in variants {
+        techniques.push(Box::new(Ddoc::new(DdocParams { variant, ..Default::default() })));
+    }
+    errors_of(scene, light, camera, &techniques)
+}
+
+fn errors_of(
+    scene: &Scene,
+    light: &Light,
+    camera: &Camera,
+    techniques: &[Box<dyn ShadowTechnique>],
+) -> Vec<metrics::Errors> {
     let gbuffer = raster::render_gbuffer(scene, camera);
     let sampling = ReferenceSettings { samples: 64, ..Default::default() };
     let truth = reference::reference(scene, &Bvh::casters(scene), light, &gbuffer, &sampling, &no_progress)
         .expect("nobody cancels");
     let valid = reference::valid_pixels(&gbuffer, light);
-    let of = |&variant: &Variant| {
-        let (prepared, _) = Ddoc::new(DdocParams { variant, ..Default::default() })
-            .prepare(scene, light)
-            .expect("few triangles");
+    let of = |technique: &Box<dyn ShadowTechnique>| {
+        let (prepared, _) = technique.prepare(&ShadowQuery { scene, light, camera }).expect("few triangles");
         let mut image = VisibilityImage::new(gbuffer.width, gbuffer.height);
-        prepared.shade(&gbuffer, &mut image);
+        prepared.shade(&gbuffer, &mut image).expect("an image of the G-buffer's size");
         metrics::errors(&image, &truth.visibility, &valid).expect("images of one size")
     };
-    variants.iter().map(of).collect()
+    techniques.iter().map(of).collect()
 }
 
 /// Rounded to 0.005: the reference's own error of 64 samples is 0.005 (rmse) over penumbrae, and a pixel that another
@@ -55,59 +69,62 @@ fn errors_do_not_grow_and_outer_penumbrae_alone_are_worse() {
     assert!(worse.is_empty(), "no better than outer penumbrae alone: {worse:?}");
 }
 
-fn square(center: Vec3, half: f32, turn: f32) -> TriangleMesh {
-    let (sin, cos) = turn.sin_cos();
-    let corner = |x: f32, z: f32| center + Vec3::new(x * cos - z * sin, 0.0, x * sin + z * cos) * half;
-    let positions = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
-    TriangleMesh::new("square", positions, vec![[0, 1, 2], [0, 2, 3]])
-}
-
-fn scene_of(meshes: &[TriangleMesh]) -> Scene {
-    let mut scene = Scene::new();
-    for mesh in meshes {
-        scene.add(mesh, Affine3A::IDENTITY, ObjectFlags::default()).expect("a sound mesh");
+/// Every built-in scene with a light of some extent, beside the variants of outer penumbrae and PCSS with defaults.
+#[test]
+fn every_soft_scene_is_better_than_outer_penumbrae_alone() {
+    let mut table = String::from("scene ddoc smoothies penumbra-map pcss\n");
+    let mut worse = Vec::new();
+    for scene in scenes::all() {
+        let mut setup = scenes::build(scene.name, 0.0).expect("a built-in scene");
+        (setup.camera.width, setup.camera.height) = (160, 120);
+        let Some(light) = setup.lights.iter().find(|light| light.is_extended()) else { continue };
+        let variants = [Variant::Ddoc, Variant::Smoothies, Variant::PenumbraMap];
+        let mut techniques: Vec<Box<dyn ShadowTechnique>> = Vec::new();
+        for variant in variants {
+            techniques.push(Box::new(Ddoc::new(DdocParams { variant, ..Default::default() })));
+        }
+        let pcss = ShadowMapParams { variant: MapVariant::Pcss, ..Default::default() };
+        techniques.push(Box::new(ShadowMap::new(pcss)));
+        let rmse: Vec<f64> = errors_of(&setup.scene, light, &setup.camera, &techniques)
+            .iter()
+            .map(|errors| errors.rmse)
+            .collect();
+        let [ddoc, smoothies, penumbra_map, pcss] = rmse[..] else { panic!("four techniques") };
+        if ddoc >= smoothies || ddoc >= penumbra_map {
+            worse.push(scene.name);
+        }
+        let [a, b, c, d] = [ddoc, smoothies, penumbra_map, pcss].map(rounded);
+        writeln!(table, "{} {a:.3} {b:.3} {c:.3} {d:.3}", scene.name).expect("a string takes everything");
     }
-    scene
+    insta::assert_snapshot!(table);
+    assert!(worse.is_empty(), "no better than outer penumbrae alone: {worse:?}");
 }
 
-/// Seen from above, in front of the light.
-fn camera() -> Camera {
-    let mut camera = scenes::build("quads", 0.0).expect("built in").camera;
-    (camera.width, camera.height) = (160, 120);
-    camera
-}
-
-const LIGHT: Light = Light::Rect {
-    center: Vec3::new(0.0, 5.0, 0.0),
-    half_u: Vec3::new(0.5, 0.0, 0.0),
-    half_v: Vec3::new(0.0, 0.0, 0.5),
-};
-
-/// Artefact 1: three squares over one another. The paper's nearest splat is the wrong one under the upper two.
+/// Artefact 1.
 #[test]
 fn layers_over_one_another_get_the_right_splats() {
-    let scene = scene_of(&[
-        square(Vec3::ZERO, 4.0, 0.0),
-        square(Vec3::new(0.1, 0.6, 0.0), 0.9, 0.1),
-        square(Vec3::new(-0.3, 1.2, 0.2), 0.7, 0.5),
-        square(Vec3::new(0.4, 1.8, -0.3), 0.5, 0.9),
-    ]);
-    let [ours, paper] = errors(&scene, &LIGHT, &camera(), &[Variant::Ddoc, Variant::Paper])[..] else {
+    let scene = artefacts::layers().expect("sound meshes");
+    let [ours, paper] = errors(
+        &scene,
+        &artefacts::LIGHT,
+        &artefacts::camera().expect("built in"),
+        &[Variant::Ddoc, Variant::Paper],
+    )[..] else {
         panic!("two variants");
     };
     assert!(ours.rmse <= 0.5 * paper.rmse, "{} of {}", ours.rmse, paper.rmse);
 }
 
-/// Artefact 2: edges at slight angles to the texels. The paper's directions are multiples of 45° and a few between.
+/// Artefact 2.
 #[test]
 fn slanted_edges_have_smooth_directions() {
-    let squares = (0..5).map(|i| {
-        let turn = 0.1 + 0.13 * i as f32;
-        square(Vec3::new(i as f32 * 0.8 - 1.6, 1.0, 0.3 * i as f32 - 0.6), 0.33, turn)
-    });
-    let meshes: Vec<_> = std::iter::once(square(Vec3::ZERO, 4.0, 0.0)).chain(squares).collect();
-    let scene = scene_of(&meshes);
-    let all = errors(&scene, &LIGHT, &camera(), &[Variant::Ddoc, Variant::ImageEdges, Variant::Paper]);
+    let scene = artefacts::directions().expect("sound meshes");
+    let all = errors(
+        &scene,
+        &artefacts::LIGHT,
+        &artefacts::camera().expect("built in"),
+        &[Variant::Ddoc, Variant::ImageEdges, Variant::Paper],
+    );
     for ours in &all[..2] {
         assert!(ours.rmse <= 0.5 * all[2].rmse, "{} of {}", ours.rmse, all[2].rmse);
     }
