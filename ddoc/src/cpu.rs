@@ -145,8 +145,9 @@ fn hard(
                 last = (Some((view, tile)), maps[view].is_clear(tile));
             }
             if let (true, Ok(receiver)) = (last.1, site(index)) {
-                let at_center = before_center(prepared, view, &receiver, &site_of(prepared, &receiver).0);
-                *value = if at_center > 0 { 0.0 } else { 1.0 };
+                let is_hidden = !is_below_nothing(prepared, view, &receiver)
+                    && before_center(prepared, view, &receiver, &site_of(prepared, &receiver).0) > 0;
+                *value = if is_hidden { 0.0 } else { 1.0 };
                 count += 1;
             }
         }
@@ -305,6 +306,16 @@ fn site_of(prepared: &PreparedDdoc<'_>, receiver: &Receiver) -> (Site, Option<Li
     let is_parallel = matches!(light, Light::Directional { .. });
     let point = receiver.point - origin;
     (Site::new(point, receiver.normal, receiver.tolerance, &cone, is_parallel), Some(cone))
+}
+
+/// Whether the map has nothing over the texel that a receiver falls into.
+fn is_below_nothing(prepared: &PreparedDdoc<'_>, view: usize, receiver: &Receiver) -> bool {
+    let (layers, faces) = (&prepared.layers[view], prepared.faces[view].lists());
+    layers.fragments.is_empty()
+        && layers
+            .image
+            .place(receiver.point)
+            .is_none_or(|place| faces.is_clear(faces.grid().tile(Some(place))))
 }
 
 /// How many faces lie between a receiver and the light's centre: the solid ones, those of masks, or what the map shows.

@@ -277,7 +277,13 @@ impl TileLists {
 
     /// Whether nothing lies over a tile.
     pub fn is_clear(&self, tile: u32) -> bool {
-        self.of(tile).next().is_none()
+        let (column, row) = (tile % self.grid.tiles, tile / self.grid.tiles);
+        (0..self.grid.levels).all(|level| {
+            let shift = RATIO * level;
+            let at = (row >> shift) * self.grid.tiles_at(level) + (column >> shift);
+            let at = self.grid.first_of(level) + at as usize;
+            self.first[at] == self.first[at + 1]
+        })
     }
 
     /// Each entry replaced.
