@@ -19,7 +19,7 @@ use glam::{Vec3, Vec4};
 use scene_core::geometry::Aabb;
 use scene_core::light::{LightHull, LightPoint};
 
-use crate::coverage::LANES;
+use crate::tile_edges::LANES;
 
 /// λ is lowered by this, as a share of the axis' length.
 const TILT: f32 = 1.0 / 65_536.0;

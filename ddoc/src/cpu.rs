@@ -11,7 +11,7 @@ use scene_core::raster::{DepthOptions, Fragments, RasterScratch, render_fragment
 use scene_core::{Light, Report, Scene};
 
 use crate::beam::Beam;
-use crate::coverage::{Counter, Site, TileEdges};
+use crate::coverage::{Counter, Site};
 use crate::distortion_map::{Farthest, distortion_map};
 #[cfg(feature = "gpu")]
 use crate::grid::Grid;
@@ -21,6 +21,7 @@ use crate::light_image::LightImage;
 use crate::outer::{self, Kept};
 use crate::params::Variant;
 use crate::silhouettes::Edge;
+use crate::tile_edges::TileEdges;
 use crate::tiles::Tiles;
 use crate::{PreparedDdoc, paper};
 

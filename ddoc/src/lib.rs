@@ -21,6 +21,7 @@ mod params;
 pub mod silhouettes;
 pub mod splat;
 mod technique;
+pub mod tile_edges;
 pub mod tiles;
 
 use std::borrow::Cow;

@@ -10,7 +10,8 @@
 
 use glam::Vec3;
 
-use crate::coverage::{Site, TileEdges};
+use crate::coverage::Site;
+use crate::tile_edges::TileEdges;
 
 /// Which of several splats over a receiver is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,5 +1,5 @@
 //! The two artefacts that the paper reports, on scenes made for them: ground truth, `paper`, `ddoc`, from left to right.
-//! `cargo run --release -p gnomon-ddoc --example figures [FOLDER]` writes `layers.png` and `directions.png` and prints errors.
+//! `cargo run --release -p gnomon-ddoc --example two_artefacts [FOLDER]` writes `layers.png` and `directions.png` and prints errors.
 
 mod artefacts;
 
