@@ -20,6 +20,10 @@ const MOST_TILES: u32 = 128;
 const MOST: u32 = 6;
 const MOST_FACE: u32 = 4;
 
+/// Where faces are few they may cover more, up to so many tiles a side and so many entries of all faces together.
+const MOST_OF_FEW: u32 = 16;
+const ENTRIES: usize = 1 << 22;
+
 /// Grids at most: a map has at most 2¹⁴ texels a side.
 const MOST_LEVELS: usize = 8;
 
@@ -71,9 +75,11 @@ impl Grid {
         .started()
     }
 
-    /// Of faces in maps of `size` texels: the finest tiles are texels.
-    pub fn of_texels(size: u32) -> Self {
-        let (levels, most) = (levels(size, MOST_FACE), MOST_FACE);
+    /// Of so many faces in maps of `size` texels: the finest tiles are texels.
+    pub fn of_texels(size: u32, faces: usize) -> Self {
+        let each = u32::try_from((ENTRIES / faces.max(1)).isqrt()).unwrap_or(MOST_OF_FEW);
+        let most = each.clamp(MOST_FACE, MOST_OF_FEW);
+        let levels = levels(size, most);
         Self { size, margin: 0, tile: 1, tiles: size, levels, most, starts: [0; MOST_LEVELS + 1] }.started()
     }
 
@@ -141,11 +147,25 @@ impl Grid {
 
     /// Calls `enter` with every tile that bounds go to.
     pub fn each_tile(&self, bounds: Bounds, enter: &mut dyn FnMut(u32)) {
+        self.each_tile_that(bounds, |_| true, enter);
+    }
+
+    /// Of those the ones that `takes` chooses by their bounds, in texels; tiles at the border reach beyond it without end.
+    pub fn each_tile_that(&self, bounds: Bounds, takes: impl Fn(Bounds) -> bool, enter: &mut dyn FnMut(u32)) {
         let range = self.range(bounds);
         let (first, side) = (self.first_of(range.level) as u32, self.tiles_at(range.level));
         for row in range.first[1]..=range.last[1] {
             for column in range.first[0]..=range.last[0] {
-                enter(first + row * side + column);
+                let width = (self.tile << (RATIO * range.level)) as f32;
+                let from = |at: u32| {
+                    if at == 0 { f32::NEG_INFINITY } else { at as f32 * width - self.margin as f32 }
+                };
+                let to = |at: u32| if at + 1 == side { f32::INFINITY } else { from(at + 1) };
+                let tile =
+                    Bounds { min: Vec2::new(from(column), from(row)), max: Vec2::new(to(column), to(row)) };
+                if takes(tile) {
+                    enter(first + row * side + column);
+                }
             }
         }
     }
@@ -320,7 +340,7 @@ mod tests {
 
     #[test]
     fn the_fullest_tile_counts_what_lies_above_it() {
-        let grid = Grid::of_texels(64);
+        let grid = Grid::of_texels(64, 1 << 20);
         let squares = [(0.0, 0.5), (0.0, 60.0), (0.2, 0.7), (50.0, 50.5)];
         let lists = TileLists::new(grid, squares.len(), |index, enter| {
             let (min, max) = squares[index];
@@ -333,7 +353,7 @@ mod tests {
 
     #[test]
     fn a_coarse_tile_has_what_its_fine_ones_have() {
-        let grid = Grid::of_texels(64);
+        let grid = Grid::of_texels(64, 1 << 20);
         let lists = TileLists::new(grid, 200, |index, enter| {
             let at = |prime: usize| (index * prime % 64) as f32;
             let min = Vec2::new(at(7), at(23));
