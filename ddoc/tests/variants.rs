@@ -33,13 +33,13 @@ fn errors_of(
     let truth = reference::reference(scene, &Bvh::casters(scene), light, &gbuffer, &sampling, &no_progress)
         .expect("nobody cancels");
     let valid = reference::valid_pixels(&gbuffer, light);
-    let of = |technique: &Box<dyn ShadowTechnique>| {
+    let of = |technique: &dyn ShadowTechnique| {
         let (prepared, _) = technique.prepare(&ShadowQuery { scene, light, camera }).expect("few triangles");
         let mut image = VisibilityImage::new(gbuffer.width, gbuffer.height);
         prepared.shade(&gbuffer, &mut image).expect("an image of the G-buffer's size");
         metrics::errors(&image, &truth.visibility, &valid).expect("images of one size")
     };
-    techniques.iter().map(of).collect()
+    techniques.iter().map(|technique| of(technique.as_ref())).collect()
 }
 
 /// Rounded to 0.005: the reference's own error of 64 samples is 0.005 (rmse) over penumbrae, and a pixel that another
