@@ -62,6 +62,7 @@ pub struct PreparedDdoc<'a> {
     origin: Vec3,
     edges: Vec<Edge>,
     /// Those from here on are outlines of the map.
+    #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "the GPU's tables alone tell them apart"))]
     first_outline: usize,
     /// Bounds of the light; none of a sun that is too wide.
     hull: Option<LightHull>,
