@@ -87,7 +87,7 @@ mod tests {
         let data = Data::load(None).unwrap();
         for time in [Time::Whole, Time::Frame] {
             let check = check(&data, time);
-            assert!(check.scenes >= 19, "{check:?}");
+            assert!(check.scenes >= 20, "{check:?}");
             eprintln!("{time:?}: {check:?}");
             assert!(check.held_in >= 0.8 && check.held_out >= 0.8, "{time:?}: {check:?}");
         }
