@@ -129,9 +129,7 @@ impl ContactHardening {
         };
         let maps = LightMaps::draw_near(query.scene, query.light, &settings, &mut report);
         let (prepared, rest) = self.prepare_with(maps, query)?;
-        let bytes = report.bytes + rest.bytes;
-        report.merge(&rest);
-        report.bytes = bytes;
+        report.merge_beside(&rest);
         Ok((prepared, report))
     }
 
@@ -153,9 +151,7 @@ impl ContactHardening {
         let source = match self.source().filter(|_| self.asks_source(query.light)) {
             Some(source) => {
                 let (prepared, rest) = source.prepare(query)?;
-                let bytes = report.bytes;
-                report.merge(&rest);
-                report.bytes = bytes + rest.bytes;
+                report.merge_beside(&rest);
                 Some(prepared)
             }
             None => None,

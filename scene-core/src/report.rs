@@ -58,6 +58,13 @@ impl Report {
         }
     }
 
+    /// [`merge`](Self::merge) of a step that holds its bytes beside this one's.
+    pub fn merge_beside(&mut self, other: &Self) {
+        let bytes = self.bytes + other.bytes;
+        self.merge(other);
+        self.bytes = bytes;
+    }
+
     /// Milliseconds of all stages whose name starts with `prefix`.
     pub fn total_ms(&self, prefix: &str) -> f64 {
         self.stages_ms.iter().filter(|(stage, _)| stage.starts_with(prefix)).map(|(_, ms)| ms).sum()

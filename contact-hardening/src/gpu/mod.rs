@@ -206,12 +206,11 @@ impl ContactHardeningOnGpu {
         report.bytes = self.bytes();
         if let Some(source) = &mut self.source {
             source.is_asked = self.technique.asks_source(query.light);
-        }
-        if let Some(source) = self.source.as_mut().filter(|source| source.is_asked) {
+            if !source.is_asked {
+                return Ok(report);
+            }
             let rest = source.technique.prepare(recorder, query)?;
-            let bytes = report.bytes + rest.bytes;
-            report.merge(&rest);
-            report.bytes = bytes;
+            report.merge_beside(&rest);
         }
         Ok(report)
     }
