@@ -13,7 +13,7 @@ use gnomon_pdsm::crossings::Crossings;
 use gnomon_pdsm::emission::{EmissionScratch, emit_events};
 use gnomon_pdsm::events::EventStrips;
 use gnomon_pdsm::grid::{DepthGrid, PixelGrid};
-use gnomon_pdsm::layout::{Layout, layouts};
+use gnomon_pdsm::layout::{Fit, Layout};
 use gnomon_pdsm::maps::{MapCasters, Target};
 use gnomon_pdsm::walk::walk_events;
 use gnomon_pdsm::{Pdsm, PdsmParams};
@@ -99,7 +99,8 @@ fn construction(setup: &SceneSetup) {
 fn layout(setup: &SceneSetup, size: u32) -> (Layout, Option<MapCasters>) {
     let light = &setup.lights[0];
     let casters = relevance::told_apart(&setup.scene, light, 1e-4).drawn;
-    let layout = layouts(&setup.scene, &casters, light, 4, size, 0).0.swap_remove(0);
+    let fit = Fit { scene: &setup.scene, light, views: 4, map_size: size, seed: 0 };
+    let layout = fit.layouts(&casters).0.swap_remove(0);
     let drawn = MapCasters::new(&setup.scene, &casters, &layout);
     (layout, drawn)
 }

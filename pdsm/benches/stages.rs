@@ -11,7 +11,7 @@ use gnomon_pdsm::emission::{EmissionScratch, emit_events};
 use gnomon_pdsm::events::EventStrips;
 use gnomon_pdsm::functions::Functions;
 use gnomon_pdsm::grid::{DepthGrid, PixelGrid};
-use gnomon_pdsm::layout::{Layout, layouts};
+use gnomon_pdsm::layout::{Fit, Layout};
 use gnomon_pdsm::walk::walk_events;
 use gnomon_pdsm::{Pdsm, PdsmParams, cpu};
 use scene_core::bvh::Bvh;
@@ -27,7 +27,8 @@ fn setup() -> SceneSetup {
 fn layout(setup: &SceneSetup, map_size: u32, views: u32) -> Layout {
     let light = &setup.lights[0];
     let casters = relevance::told_apart(&setup.scene, light, 1e-4).drawn;
-    layouts(&setup.scene, &casters, light, views, map_size, 0).0.swap_remove(0)
+    let fit = Fit { scene: &setup.scene, light, views, map_size, seed: 0 };
+    fit.layouts(&casters).0.swap_remove(0)
 }
 
 fn events(criterion: &mut Criterion) {

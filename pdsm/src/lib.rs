@@ -31,7 +31,7 @@ use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
 use cpu::{Lookup, Window};
 use functions::Functions;
 use grid::PixelGrid;
-use layout::{Layout, Part};
+use layout::{Fit, Layout, Part};
 pub use params::{ErrorMeasure, PdsmParams, Precision};
 use surfaces::Surfaces;
 pub use technique::Factory;
@@ -119,7 +119,7 @@ impl Pdsm {
             let told = relevance::told_apart_with_solids(scene, light, tolerance);
             report.skip("casters", told.backdrops.iter().filter(|object| meant(object)).count() as u64);
             let casters: Vec<_> = told.drawn.into_iter().filter(|object| meant(object)).collect();
-            let layouts = layout::layouts(scene, &casters, light, views, map_size, seed);
+            let layouts = Fit { scene, light, views, map_size, seed }.layouts(&casters);
             (casters, layouts)
         });
         report.skip("windows", skipped);
@@ -189,7 +189,7 @@ impl Pdsm {
         let region = CasterRegion::between(scene, &receivers, light);
         let casters: Vec<_> =
             casters.iter().copied().filter(|object| region.touches(&object.bounds)).collect();
-        let layout = layout::layout_of_part(scene, &casters, light, views, map_size, seed, part)?;
+        let layout = Fit { scene, light, views, map_size, seed }.layout_of_part(&casters, part)?;
         let is_finer = layout.texel_area(middle) * 4.0 <= coarse;
         is_finer.then_some((layout, casters))
     }

@@ -36,58 +36,64 @@ const RIM: u32 = 4;
 /// Ways that a window is turned about the light's, in which the smallest is looked for.
 const TURNS: u32 = 16;
 
-/// The windows of `light` over `casters`, with `views` stratified samples each, maps of `map_size` texels a side.
-/// Windows without casters are left out; `skipped` counts them. A light without extent has one sample.
-pub fn layouts(
-    scene: &Scene,
-    casters: &[&Object],
-    light: &Light,
-    views: u32,
-    map_size: u32,
-    seed: u64,
-) -> (Vec<Layout>, u64) {
-    let bounds = casters.iter().fold(Aabb::EMPTY, |sum, object| sum.union(object.bounds));
-    if bounds.is_empty() {
-        return (Vec::new(), 0);
-    }
-    let frames = frames(light, bounds);
-    let tried = frames.len() as u64;
-    let build = Builder::new(scene, casters, light, views, map_size, seed);
-    let receivers = build.vertices(scene.objects().iter().filter(|object| object.flags.receives));
-    let layouts: Vec<_> = frames
-        .into_iter()
-        .filter_map(|frame| build.layout(frame, &Asked { points: &receivers, corners: &receivers, rim: RIM }))
-        .collect();
-    let skipped = tried - layouts.len() as u64;
-    (layouts, skipped)
+/// What windows are fitted to, beside casters.
+#[derive(Clone, Copy, Debug)]
+pub struct Fit<'a> {
+    /// Receivers, and positions.
+    pub scene: &'a Scene,
+    /// The light.
+    pub light: &'a Light,
+    /// Stratified samples a window; a light without extent has one.
+    pub views: u32,
+    /// Texels a side of the maps.
+    pub map_size: u32,
+    /// What the samples are drawn from.
+    pub seed: u64,
 }
 
-/// The window of `light` over `casters` for the receivers of `part` alone, with all texels where those are. `None` if no
-/// caster is in their way or one window cannot look at all of them.
-pub fn layout_of_part(
-    scene: &Scene,
-    casters: &[&Object],
-    light: &Light,
-    views: u32,
-    map_size: u32,
-    seed: u64,
-    part: &Part,
-) -> Option<Layout> {
-    let corners = part.bounds.corners();
-    let build = Builder::new(scene, casters, light, views, map_size, seed);
-    let frame = frame_towards(light, part.bounds)?;
-    let mut layout =
-        build.layout(frame, &Asked { points: &part.points, corners: &corners, rim: part.rim.max(RIM) })?;
-    // What lies between the points that were looked at belongs to the part, too, but no texel of the rim does.
-    let texels = part.points.iter().filter_map(|&point| layout.project(point)).map(|at| at.texel);
-    let [low, high] = texels
-        .fold([Vec2::INFINITY, Vec2::NEG_INFINITY], |[low, high], texel| [low.min(texel), high.max(texel)]);
-    let rim = Vec2::splat(part.rim as f32);
-    let last = Vec2::splat(map_size as f32) - rim;
-    let between = (high - low) * Part::BETWEEN;
-    layout.part =
-        Some(Held { bounds: part.bounds, texels: [(low - between).max(rim), (high + between).min(last)] });
-    Some(layout)
+impl Fit<'_> {
+    /// The windows over `casters`. Those without casters are left out, and counted.
+    pub fn layouts(&self, casters: &[&Object]) -> (Vec<Layout>, u64) {
+        let bounds = casters.iter().fold(Aabb::EMPTY, |sum, object| sum.union(object.bounds));
+        if bounds.is_empty() {
+            return (Vec::new(), 0);
+        }
+        let frames = frames(self.light, bounds);
+        let tried = frames.len() as u64;
+        let build = Builder::new(self, casters);
+        let receivers = build.vertices(self.scene.objects().iter().filter(|object| object.flags.receives));
+        let layouts: Vec<_> = frames
+            .into_iter()
+            .filter_map(|frame| {
+                build.layout(frame, &Asked { points: &receivers, corners: &receivers, rim: RIM })
+            })
+            .collect();
+        let skipped = tried - layouts.len() as u64;
+        (layouts, skipped)
+    }
+
+    /// The window over `casters` for the receivers of `part` alone, with all texels where those are. `None` if no
+    /// caster is in their way or one window cannot look at all of them.
+    pub fn layout_of_part(&self, casters: &[&Object], part: &Part) -> Option<Layout> {
+        let corners = part.bounds.corners();
+        let build = Builder::new(self, casters);
+        let frame = frame_towards(self.light, part.bounds)?;
+        let mut layout = build
+            .layout(frame, &Asked { points: &part.points, corners: &corners, rim: part.rim.max(RIM) })?;
+        // What lies between the points that were looked at belongs to the part, too, but no texel of the rim does.
+        let texels = part.points.iter().filter_map(|&point| layout.project(point)).map(|at| at.texel);
+        let [low, high] = texels.fold([Vec2::INFINITY, Vec2::NEG_INFINITY], |[low, high], texel| {
+            [low.min(texel), high.max(texel)]
+        });
+        let rim = Vec2::splat(part.rim as f32);
+        let last = Vec2::splat(self.map_size as f32) - rim;
+        let between = (high - low) * Part::BETWEEN;
+        layout.part = Some(Held {
+            bounds: part.bounds,
+            texels: [(low - between).max(rim), (high + between).min(last)],
+        });
+        Some(layout)
+    }
 }
 
 /// What a window is fitted to: positions whose rays it must hold, the corners of a region that all of them lie in, and
@@ -170,11 +176,7 @@ fn frames(light: &Light, casters: Aabb) -> Vec<Frame> {
 struct Builder<'a> {
     /// Of all casters.
     vertices: Vec<Vec3>,
-    scene: &'a Scene,
-    light: &'a Light,
-    views: u32,
-    map_size: u32,
-    seed: u64,
+    fit: &'a Fit<'a>,
 }
 
 /// A rectangle on the window's plane.
@@ -193,22 +195,14 @@ impl Rect {
 }
 
 impl<'a> Builder<'a> {
-    fn new(
-        scene: &'a Scene,
-        casters: &[&Object],
-        light: &'a Light,
-        views: u32,
-        map_size: u32,
-        seed: u64,
-    ) -> Self {
-        let views = if light.is_extended() { views } else { 1 };
-        let mut build = Self { vertices: Vec::new(), scene, light, views, map_size, seed };
+    fn new(fit: &'a Fit<'a>, casters: &[&Object]) -> Self {
+        let mut build = Self { vertices: Vec::new(), fit };
         build.vertices = build.vertices(casters.iter().copied());
         build
     }
 
     fn vertices<'o>(&self, objects: impl Iterator<Item = &'o Object>) -> Vec<Vec3> {
-        objects.flat_map(|o| &self.scene.positions()[o.vertices.clone()]).copied().collect()
+        objects.flat_map(|o| &self.fit.scene.positions()[o.vertices.clone()]).copied().collect()
     }
 
     fn layout(&self, frame: Frame, asked: &Asked<'_>) -> Option<Layout> {
@@ -238,8 +232,8 @@ impl<'a> Builder<'a> {
         let offsets = self.offsets(&frame, 0.5 * (near + far));
         let around =
             |offsets: &[DVec2]| offsets.iter().fold(Rect::EMPTY, |sum, &a| sum.with(a, [DVec2::ZERO; 2]));
-        let rim = f64::from(asked.rim) / f64::from(self.map_size.max(1));
-        let cone = match *self.light {
+        let rim = f64::from(asked.rim) / f64::from(self.fit.map_size.max(1));
+        let cone = match *self.fit.light {
             Light::Spot { direction, outer, .. } => {
                 Some(Cone { axis: direction.as_dvec3().normalize_or_zero(), angle: f64::from(outer) })
             }
@@ -265,7 +259,7 @@ impl<'a> Builder<'a> {
             .max(DVec2::splat(window.max.abs().max(window.min.abs()).max_element() * SMALLEST_SHARE))
             .max(DVec2::splat(1e-30));
         let corner = window.min - size * MARGIN;
-        let texels_per_unit = f64::from(self.map_size) / (size * (1.0 + 2.0 * MARGIN));
+        let texels_per_unit = f64::from(self.fit.map_size) / (size * (1.0 + 2.0 * MARGIN));
         let depth = if frame.is_parallel {
             Depth::Parallel { focus: focus as f32, per_unit: per_unit as f32 }
         } else {
@@ -277,7 +271,7 @@ impl<'a> Builder<'a> {
             depth,
             corner: corner.as_vec2(),
             texels_per_unit: texels_per_unit.as_vec2(),
-            map_size: self.map_size,
+            map_size: self.fit.map_size,
             max_tan: frame.max_tan as f32,
             caster_range: [near, far],
             offsets: offsets.iter().map(|a| a.as_vec2()).collect(),
@@ -293,7 +287,7 @@ impl<'a> Builder<'a> {
     /// Offsets of the samples in the window's plane: of places, or of directions per unit travelled.
     fn offsets(&self, frame: &Frame, distance: f64) -> Vec<DVec2> {
         // A sphere is taken for a disk: from distance d it is seen as large as a disk of radius r/√(1 − (r/d)²).
-        let flat = match *self.light {
+        let flat = match *self.fit.light {
             Light::Sphere { center, radius } => {
                 let share = (f64::from(radius) / distance).min(0.99);
                 let radius = f64::from(radius) / (1.0 - share * share).sqrt();
@@ -302,8 +296,9 @@ impl<'a> Builder<'a> {
             light => light,
         };
         let view = LightView::new(&flat, frame.origin.as_vec3());
-        let mut points = vec![LightPoint::At(Vec3::ZERO); self.views as usize];
-        stratified(&view, SampleKey::new(self.seed, 0), &mut points);
+        let views = if self.fit.light.is_extended() { self.fit.views } else { 1 };
+        let mut points = vec![LightPoint::At(Vec3::ZERO); views as usize];
+        stratified(&view, SampleKey::new(self.fit.seed, 0), &mut points);
         let axes = frame.axes.transpose();
         points
             .iter()

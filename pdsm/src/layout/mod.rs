@@ -20,7 +20,7 @@ mod view;
 use glam::{DVec3, Mat4, Vec2, Vec3, Vec4};
 use scene_core::geometry::Aabb;
 
-pub use fit::{layout_of_part, layouts};
+pub use fit::Fit;
 pub use view::{Part, parts};
 
 /// How distance becomes t.
@@ -274,13 +274,17 @@ mod tests {
         ]
     }
 
+    fn fit<'a>(scene: &'a Scene, light: &'a Light, views: u32, map_size: u32, seed: u64) -> Fit<'a> {
+        Fit { scene, light, views, map_size, seed }
+    }
+
     /// What makes everything else work: in every map a point lies at q + D·t with the same t.
     #[test]
     fn rays_are_translates_in_every_map() {
         let setup = scenes::build("quads", 0.0).unwrap();
         let casters: Vec<_> = setup.scene.objects().iter().collect();
         for light in lights() {
-            let (layouts, _) = layouts(&setup.scene, &casters, &light, 9, 256, 1);
+            let (layouts, _) = fit(&setup.scene, &light, 9, 256, 1).layouts(&casters);
             assert!(!layouts.is_empty(), "{light:?}");
             for layout in &layouts {
                 let t_of_depth = layout.t_of_depth();
@@ -308,7 +312,7 @@ mod tests {
         let point = Vec3::new(0.1, 0.4, 0.2);
         let (u, v) = normal.any_orthonormal_pair();
         for light in lights() {
-            let (layouts, _) = layouts(&setup.scene, &casters, &light, 4, 256, 1);
+            let (layouts, _) = fit(&setup.scene, &light, 4, 256, 1).layouts(&casters);
             for layout in &layouts {
                 let Some(here) = layout.locate(point) else { continue };
                 let (slope, lift) = layout.plane_slope(point, normal, here.t);
@@ -331,7 +335,7 @@ mod tests {
         let casters: Vec<_> = setup.scene.objects().iter().collect();
         let count = |position| {
             let light = Light::Sphere { center: position, radius: 0.1 };
-            let (layouts, skipped) = layouts(&setup.scene, &casters, &light, 4, 64, 0);
+            let (layouts, skipped) = fit(&setup.scene, &light, 4, 64, 0).layouts(&casters);
             layouts.len() as u64 + skipped
         };
         let bounds = setup.scene.bounds();
@@ -342,6 +346,6 @@ mod tests {
     #[test]
     fn no_caster_is_no_window() {
         let scene = Scene::new();
-        assert_eq!(layouts(&scene, &[], &lights()[0], 4, 64, 0), (Vec::new(), 0));
+        assert_eq!(fit(&scene, &lights()[0], 4, 64, 0).layouts(&[]), (Vec::new(), 0));
     }
 }

@@ -133,7 +133,7 @@ mod tests {
     use scene_core::{relevance, scenes};
 
     use super::*;
-    use crate::layout::layouts;
+    use crate::layout::Fit;
 
     /// The rasteriser of scene-core draws the same casters, from the same layout, by another way: depths agree but for
     /// texels that an edge passes within what snapping moves it.
@@ -144,7 +144,7 @@ mod tests {
             let (scene, light) = (&setup.scene, &setup.lights[0]);
             let casters = relevance::told_apart(scene, light, 1e-4).drawn;
             let size = 128;
-            let (layouts, _) = layouts(scene, &casters, light, 20, size, 0);
+            let (layouts, _) = Fit { scene, light, views: 20, map_size: size, seed: 0 }.layouts(&casters);
             for layout in &layouts {
                 let Some(drawn) = MapCasters::new(scene, &casters, layout) else { continue };
                 let steps: Vec<_> = layout.steps().collect();
