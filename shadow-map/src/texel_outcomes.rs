@@ -1,8 +1,9 @@
 //! What each texel that a patch is looked up in is to the patch: see [`patches`](crate::patches).
 
-use glam::{DVec2, DVec3, DVec4, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use crate::light_maps::{LightMaps, ShadowMapView};
+use crate::light_views::TexelBounds;
 use crate::patches::{Form, Outcome, Patch, Questions};
 
 /// Columns of a table, at most: a row's outcomes are the bits of two words.
@@ -146,30 +147,13 @@ pub(crate) fn bits(mut mask: u128) -> impl Iterator<Item = usize> {
 }
 
 /// Bounds of a patch in a view's texels, columns and rows, with the rounding of a projection in f32 allowed for. `None` if
-/// part of it may lie behind the view.
+/// part of it may lie behind the view, or that is more than a quarter of a texel.
 fn texels_of(map: &ShadowMapView, questions: &Questions) -> Option<(DVec2, DVec2)> {
     let (center, half) = questions.bounds();
-    let clip_from_world = map.view.projection_from_world.as_dmat4();
-    let size = f64::from(map.map.width);
-    let [x, y, w] = [0, 1, 3].map(|row| clip_from_world.row(row));
-    let far = center.abs() + half;
-    // Four products and three sums of f32: at most 4·2⁻²⁴ of the terms' sizes, here four times that.
-    let error = |row: DVec4| (row.truncate().abs().dot(far) + row.w.abs()) * (1.0 / 1_048_576.0);
-    let at = |row: DVec4, point: DVec3| row.truncate().dot(point) + row.w;
-    let (mut min, mut max) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-    let mut least = f64::INFINITY;
-    for corner in 0..8 {
+    let corners = (0..8).map(|corner| {
         let side = |bit: u32| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
-        let point = center + half * DVec3::new(side(0), side(1), side(2));
-        let depth = at(w, point);
-        least = least.min(depth);
-        let ndc = DVec2::new(at(x, point), at(y, point)) / depth;
-        let texel = (DVec2::new(ndc.x, -ndc.y) * 0.5 + 0.5) * size;
-        (min, max) = (min.min(texel), max.max(texel));
-    }
-    let error_w = error(w);
-    // Inside of a view or little beside it, so that device coordinates are below 2.
-    let error = (error(x).max(error(y)) + 2.0 * error_w) / least * size + size * (1.0 / 1_048_576.0);
-    let is_sound = least > 0.0 && least > 16.0 * error_w && (min + max).is_finite() && error < 0.25;
-    is_sound.then(|| (min - error, max + error))
+        center + half * DVec3::new(side(0), side(1), side(2))
+    });
+    let TexelBounds { min, max, error } = map.view.texel_bounds(map.map.width, corners)?;
+    (error < 0.25).then(|| (min - error, max + error))
 }

@@ -5,13 +5,12 @@
 //! one farther off would be stored and asked in its place. So each texel that is looked up holds the same
 //! triangle as in a map of all casters, and no pixel changes.
 
-use glam::{DVec2, DVec4};
 use scene_core::light::LightPoint;
 use scene_core::relevance::{CasterRegion, HalfSpace, Receivers, RelevantCasters};
 use scene_core::{Light, Report, Scene};
 
 use crate::light_maps::Window;
-use crate::light_views::LightView;
+use crate::light_views::{LightView, TexelBounds};
 
 /// What of one view's map matters.
 #[derive(Clone, Debug)]
@@ -66,27 +65,13 @@ pub fn looked_up_in(view: &LightView, map_size: u32, reach: f64) -> Option<Vec<H
 }
 
 /// The columns and rows of `view`'s map that lookups for `receivers` read, up to `reach` texels from their own. All of them
-/// where part of the receivers may lie behind the view.
-///
-/// Two texels more are for that of the receiver and for rounding: a projection in f32 is four products and three sums, off by
-/// four times 2⁻²⁴ of the terms' sizes at most, of which there may be more than a texel far from the origin.
+/// where part of the receivers may lie behind the view. Two texels more are for that of the receiver and for rounding.
 pub fn looked_up_texels(view: &LightView, receivers: &Receivers, map_size: u32, reach: f64) -> Window {
-    let (all, size) = ([0..map_size, 0..map_size], f64::from(map_size));
-    let clip_from_world = view.projection_from_world.as_dmat4();
-    let [x, y, w] = [0, 1, 3].map(|row| clip_from_world.row(row));
-    let sizes = |row: DVec4, point: glam::DVec3| row.truncate().abs().dot(point.abs()) + row.w.abs();
-    let (mut min, mut max) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-    for point in receivers.region().vertices() {
-        let at = |row: DVec4| row.truncate().dot(point) + row.w;
-        let (depth, error) =
-            (at(w), (sizes(x, point) + sizes(y, point) + 2.0 * sizes(w, point)) / 1_048_576.0);
-        let texel = (DVec2::new(at(x), -at(y)) / depth * 0.5 + 0.5) * size;
-        if !(depth > sizes(w, point) / 65_536.0 && texel.is_finite()) {
-            return all;
-        }
-        let error = error / depth * size;
-        (min, max) = (min.min(texel - error), max.max(texel + error));
-    }
+    let Some(TexelBounds { min, max, error }) = view.texel_bounds(map_size, receivers.region().vertices())
+    else {
+        return [0..map_size, 0..map_size];
+    };
+    let reach = reach + error;
     // A cast saturates, and without receivers all is empty.
     let side = |min: f64, max: f64| {
         let end = ((max + reach + 3.0).ceil() as u32).min(map_size);
