@@ -257,25 +257,22 @@ impl Strip<'_> {
                         }
                     }
                 }
-                if self.params.skip {
-                    self.shade_parts(values, members, of_tile, parts, scratch);
-                } else {
-                    for (pixel, receiver) in &*members {
-                        values[*pixel as usize] = self.answer.visibility(receiver, all, scratch);
-                    }
-                }
+                let asked_of_all = (!self.params.skip).then_some(&all[..]);
+                self.shade_parts(values, members, of_tile, asked_of_all, parts, scratch);
             }
         }
     }
 
     /// Shades a tile's receivers, halved by place as long as that may leave out edges: a tile often sees two surfaces far
-    /// apart, or leaves. `edges` holds the tile's, and lists of parts behind them.
+    /// apart, or leaves. `edges` holds the tile's, and lists of parts behind them. With `all` receivers are asked about these
+    /// edges instead; the parts that are traced stay those: a sample on an edge may be counted otherwise than it is traced.
     #[inline(always)]
     fn shade_parts(
         &self,
         values: &mut [f32],
         members: &mut [(u32, Receiver)],
         edges: &mut Vec<u32>,
+        all: Option<&[u32]>,
         parts: &mut Vec<Part>,
         scratch: &mut Scratch,
     ) {
@@ -323,7 +320,7 @@ impl Strip<'_> {
                     scratch.work.asked += 1;
                     exact.traced(receiver, scratch)
                 } else {
-                    self.answer.visibility(receiver, &edges[start..], scratch)
+                    self.answer.visibility(receiver, all.unwrap_or(&edges[start..]), scratch)
                 };
             }
         }

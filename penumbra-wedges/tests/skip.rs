@@ -2,8 +2,8 @@
 
 mod truth;
 
-use gnomon_penumbra_wedges::{Variant, WedgeParams};
-use scene_core::{Camera, Light, Report, Scene, scenes};
+use gnomon_penumbra_wedges::{Casters, PenumbraWedges, Variant, WedgeParams};
+use scene_core::{Camera, Light, Report, Scene, VisibilityImage, raster, scenes};
 use truth::shade;
 
 /// Images with skipping on and off; the report of the first.
@@ -31,6 +31,23 @@ fn wedges_are_left_out_for_tiles_and_pixels() {
             assert!(report.skipped["pixels outside of a wedge"] > 0, "{spec}");
         }
     }
+}
+
+/// A sample on an edge may be counted otherwise than it is traced, so that which pixels are traced must not hang on what is left out.
+#[test]
+fn the_same_pixels_are_traced() {
+    let setup = scenes::build("park:leaves=300", 0.0).expect("built in");
+    let camera = setup.camera.with_size(32, 24);
+    let gbuffer = raster::render_gbuffer(&setup.scene, &camera);
+    let casters = Casters::new(&setup.scene).expect("few triangles");
+    let [with, without] = [true, false].map(|skip| {
+        let params = WedgeParams { skip, views: 16, ..Default::default() };
+        let (prepared, _) =
+            PenumbraWedges::new(params).prepare(&casters, &setup.lights[0], &camera).expect("in its limits");
+        prepared.shade_and_count(&gbuffer, &mut VisibilityImage::new(32, 24)).1
+    });
+    assert!(with.traced > 0 && with.traced < with.asked, "{with:?}");
+    assert_eq!(with.traced, without.traced);
 }
 
 #[test]
