@@ -21,7 +21,7 @@ const MARGIN: f32 = 1.0 / 65_536.0;
 /// The nearest distance a perspective view sees, as a fraction of its farthest caster's. Reversed floating
 /// point depth keeps its relative precision at any distance, so this may be as small as positions themselves
 /// are exact (2⁻²⁰).
-const NEAR_FRACTION: f32 = 1.0 / 1_048_576.0;
+pub(crate) const NEAR_FRACTION: f32 = 1.0 / 1_048_576.0;
 
 /// A projection of the light's.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -31,7 +31,7 @@ use scene_core::{GBuffer, Report, VisibilityImage};
 use crate::PreparedVariant;
 use crate::cpu;
 use crate::light_maps::{LightMaps, Receiver, ShadowMapView};
-use crate::light_views::Unprojection;
+use crate::light_views::{LightView, NEAR_FRACTION, Unprojection};
 use crate::params::ShadowMapParams;
 use crate::texel_plane::TexelPlane;
 
@@ -60,50 +60,32 @@ struct MomentMap {
     depths: DepthScale,
 }
 
-/// Maps what a view stores to a distance from the light in [−1, 1], linear in space.
+/// What a view stores, as a distance from the light in [−1, 1], linear in space: from the near end of the view's depths to the far
+/// one, so that rounding of a stored depth is a few 2⁻²⁴ of it whatever is stored.
 #[derive(Clone, Copy, Debug)]
-struct DepthScale {
-    /// Of a central view, the near distance; 0 for parallel light.
-    near: f32,
-    middle: f32,
-    scale: f32,
+enum DepthScale {
+    /// Reversed depth falls with the distance.
+    Parallel,
+    /// Reversed depth is the near distance over that to the point, and the near one is [`NEAR_FRACTION`] of the farthest.
+    Central,
 }
 
 impl DepthScale {
-    /// Spans the depths stored in `map`.
-    fn new(map: &ShadowMapView) -> Self {
-        let near = match map.view.unproject {
-            Unprojection::Parallel { .. } => 0.0,
-            Unprojection::Central { near, .. } => near,
+    fn new(view: &LightView) -> Self {
+        match view.unproject {
+            Unprojection::Parallel { .. } => Self::Parallel,
+            Unprojection::Central { .. } => Self::Central,
+        }
+    }
+
+    /// In [−1, 1]; 1 for what is as far as any caster or farther, and where nothing is stored.
+    #[inline]
+    fn scaled(self, depth: f32) -> f32 {
+        let scaled = match self {
+            Self::Parallel => 1.0 - 2.0 * depth,
+            Self::Central => 2.0 * NEAR_FRACTION / depth - 1.0,
         };
-        let mut scale = Self { near, middle: 0.0, scale: 1.0 };
-        let stored =
-            map.map.depth.par_iter().filter(|&&depth| depth > 0.0).map(|&depth| scale.distance(depth));
-        let (min, max) = stored
-            .map(|distance| (distance, distance))
-            .reduce(|| (f32::INFINITY, f32::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
-        scale.middle = 0.5 * (min + max);
-        scale.scale = 2.0 / (max - min).max(f32::MIN_POSITIVE);
-        scale
-    }
-
-    /// Grows away from the light.
-    #[inline]
-    fn distance(&self, depth: f32) -> f32 {
-        if self.near > 0.0 { self.near / depth } else { -depth }
-    }
-
-    /// In [−1, 1]; 1 for what is as far as the farthest caster or farther, and where nothing is stored.
-    #[inline]
-    fn scaled(&self, depth: f32) -> f32 {
-        if depth > 0.0 { self.scaled_distance(self.distance(depth)) } else { 1.0 }
-    }
-
-    #[inline]
-    fn scaled_distance(&self, distance: f32) -> f32 {
-        // A lone depth spans nothing: its scale may be infinite, and 0·∞ is in the middle.
-        let scaled = (distance - self.middle) * self.scale;
-        if scaled.is_nan() { 0.0 } else { scaled.clamp(-1.0, 1.0) }
+        if depth > 0.0 { scaled.clamp(-1.0, 1.0) } else { 1.0 }
     }
 }
 
@@ -148,7 +130,7 @@ impl<'a> Moments<'a> {
 impl MomentMap {
     fn new(maps: &LightMaps<'_>, view: usize, window: usize) -> Self {
         let map = &maps.maps[view];
-        let depths = DepthScale::new(map);
+        let depths = DepthScale::new(&map.view);
         let size = map.map.width as usize;
         // An even window has half a texel at both ends.
         let half = window / 2;
@@ -160,7 +142,7 @@ impl MomentMap {
         let mut scaled = vec![1.0f32; wide * wide];
         scaled.par_chunks_mut(wide).enumerate().for_each(|(row, line)| {
             for (column, value) in line.iter_mut().enumerate() {
-                *value = depth_at(maps, view, &depths, at(column), at(row));
+                *value = depth_at(maps, view, depths, at(column), at(row));
             }
         });
         let share = 1.0 / window as f32;
@@ -267,7 +249,7 @@ impl Window {
 }
 
 /// The scaled depth of a texel, beyond a cube face's border that of the face beside it, as this face's axis has it.
-fn depth_at(maps: &LightMaps<'_>, view: usize, depths: &DepthScale, column: i32, row: i32) -> f32 {
+fn depth_at(maps: &LightMaps<'_>, view: usize, depths: DepthScale, column: i32, row: i32) -> f32 {
     let map = &maps.maps[view];
     let size = map.map.width as i32;
     if (0..size).contains(&column) && (0..size).contains(&row) {
@@ -278,8 +260,9 @@ fn depth_at(maps: &LightMaps<'_>, view: usize, depths: &DepthScale, column: i32,
     }
     let texel = 2.0 / size as f32;
     let ndc = Vec2::new((column as f32 + 0.5) * texel - 1.0, 1.0 - (row as f32 + 0.5) * texel);
-    // Any place on the line from the light will do: half of the way to where the nearest depth is 1.
-    let beside = maps.occluder(map.view.unproject(ndc, 0.5));
+    // Any place on the line from the light will do, and its direction is the most exact at the far end: near the light the place is
+    // the light's but for its last digits.
+    let beside = maps.occluder(map.view.unproject(ndc, NEAR_FRACTION));
     beside.map_or(1.0, |occluder| depths.scaled(map.view.depth_of(occluder.point)))
 }
 

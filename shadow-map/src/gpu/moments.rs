@@ -25,14 +25,11 @@ pub(super) struct Moments {
     params: ShadowMapParams,
     maps: LightMapsOnGpu,
     depths: FilterMapsOnGpu,
-    scales: WorkBuffer,
     lines: WorkBuffer,
     moments: WorkBuffer,
     blur_group: HeldGroup,
     /// One a view.
     blurs: Vec<(HeldBuffer, HeldGroup)>,
-    begin_scale: ComputePass,
-    find_scale: ComputePass,
     rows: ComputePass,
     columns: ComputePass,
     bound: HeldBuffer,
@@ -60,19 +57,12 @@ impl Moments {
             binding::UNIFORM,
             binding::STORAGE_WRITE,
             binding::STORAGE_WRITE,
-            binding::STORAGE_WRITE,
         ];
         let blur_group = HeldGroup::new(device, "blur", compute, &types);
         let groups = [Some(blur_group.layout())];
         let step = |entry| ComputePass::new(device, entry, shaders::PREPARE_MOMENTS, entry, &groups);
-        let types = [
-            binding::UNIFORM,
-            binding::STORAGE,
-            binding::ID_LAYERS,
-            binding::UNIFORM,
-            binding::STORAGE,
-            binding::STORAGE,
-        ];
+        let types =
+            [binding::UNIFORM, binding::STORAGE, binding::ID_LAYERS, binding::UNIFORM, binding::STORAGE];
         let own = HeldGroup::new(device, "moments", fragment, &types);
         let pass = VisibilityPass::new(
             device,
@@ -90,11 +80,8 @@ impl Moments {
             params,
             maps: LightMapsOnGpu::new(device, params),
             depths: FilterMapsOnGpu::new(device, params.map_size, &scene.triangles_layout),
-            scales: WorkBuffer::new("scales of depths"),
             lines: WorkBuffer::new("rows of moments"),
             moments: WorkBuffer::new("moments"),
-            begin_scale: step("begin_scale"),
-            find_scale: step("find_scale"),
             rows: step("blur_rows"),
             columns: step("blur_columns"),
             blur_group,
@@ -108,13 +95,13 @@ impl Moments {
         }
     }
 
-    /// `prepare.moments`: gives the buffers of scales and moments.
+    /// `prepare.moments`: gives the buffer of moments.
     fn blur(
         &mut self,
         recorder: &mut Recorder<'_>,
         drawn: &DrawnMaps,
         depths: &wgpu::Buffer,
-    ) -> Result<[wgpu::Buffer; 2], GpuError> {
+    ) -> Result<wgpu::Buffer, GpuError> {
         let device = recorder.device;
         let (size, window) = (self.params.map_size, self.params.filter);
         let half = window / 2;
@@ -122,7 +109,6 @@ impl Moments {
         let wide = size + 2 * border;
         let texels = |width: u32, height: u32| u64::from(width) * u64::from(height) * 16;
         let views = u64::from(drawn.count.max(1));
-        let scales = self.scales.get(device, views * 8)?;
         let lines = self.lines.get(device, texels(side, wide))?;
         let moments = self.moments.get(device, views * texels(side, side))?;
         for view in 0..drawn.count {
@@ -133,28 +119,25 @@ impl Moments {
             let start = view * side * side;
             let blur = BlurUniform { view, window, half, border, side, wide, start, padding: 0 };
             let uniform = uniform.get(device, bytemuck::bytes_of(&blur));
-            let bound: [Bound; 8] = [
+            let bound: [Bound; 7] = [
                 drawn.maps.clone().into(),
                 drawn.views.clone().into(),
                 drawn.ids.clone(),
                 depths.clone().into(),
                 uniform.into(),
-                scales.clone().into(),
                 lines.clone().into(),
                 moments.clone().into(),
             ];
             let group = group.get(device, &bound);
             let groups = |texels: u32| texels.div_ceil(GROUP);
             for (pass, workgroups) in [
-                (&self.begin_scale, [1; 3]),
-                (&self.find_scale, [groups(size), groups(size), 1]),
                 (&self.rows, [groups(side), groups(wide), 1]),
                 (&self.columns, [groups(side), groups(side), 1]),
             ] {
                 pass.record(recorder, "prepare.moments", &[Some(&group)], workgroups);
             }
         }
-        Ok([scales, moments])
+        Ok(moments)
     }
 
     fn bytes(&self) -> u64 {
@@ -176,7 +159,7 @@ impl VariantOnGpu for Moments {
         if let Some(drawn) = self.maps.draw(recorder, &query.scene, &plan, "prepare.maps")? {
             let scene = self.scene.groups(device, &query.scene);
             let depths = self.depths.record(recorder, &drawn, &scene.triangles)?;
-            let [scales, moments] = self.blur(recorder, &drawn, &depths)?;
+            let moments = self.blur(recorder, &drawn, &depths)?;
             let bound = BoundUniform {
                 window: self.params.filter as f32,
                 moments: if self.params.moments == 4 { 4 } else { 2 },
@@ -184,14 +167,7 @@ impl VariantOnGpu for Moments {
                 side: self.params.map_size + 2,
             };
             let bound = self.bound.get(device, bytemuck::bytes_of(&bound));
-            let own = [
-                drawn.maps.into(),
-                drawn.views.into(),
-                drawn.ids,
-                bound.into(),
-                scales.into(),
-                moments.into(),
-            ];
+            let own = [drawn.maps.into(), drawn.views.into(), drawn.ids, bound.into(), moments.into()];
             self.prepared = Some((self.own.get(device, &own), scene));
         }
         self.receivers.prepare(device, query);
