@@ -1,4 +1,5 @@
-//! What this crate's page claims, measured in one run: `cargo bench -p gnomon-pdsm --bench claims [SCENE]`.
+//! What this crate's page claims, measured in one run: `cargo bench -p gnomon-pdsm --bench claims [PART…] [SCENE]`, where PART is
+//! `construction`, `shading` or `emission`; all of them without one.
 //!
 //! Prints construction time against the number of maps beside the paper's, peak memory, emission beside the paper's walk
 //! at every resolution, lookups on one thread, and shading beside 64 shadow rays a pixel. SCENE is a built-in scene or a
@@ -23,6 +24,9 @@ use scene_core::{SceneSetup, VisibilityImage, io, raster, relevance, scenes};
 
 /// Construction of the paper's dragon, on its machine, in milliseconds.
 const PAPER_MS: f64 = 33_000.0;
+
+/// What can be measured alone.
+const PARTS: [&str; 3] = ["construction", "shading", "emission"];
 
 fn milliseconds<T>(work: impl FnOnce() -> T) -> f64 {
     let start = Instant::now();
@@ -182,13 +186,21 @@ fn shading(setup: &SceneSetup) -> Result<(), Box<dyn std::error::Error>> {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Cargo hands `--bench` over, too.
-    let name = std::env::args().skip(1).find(|argument| !argument.starts_with('-'));
-    let name = name.as_deref().unwrap_or("knot:sides=79");
+    let words: Vec<_> = std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
+    let (parts, names): (Vec<_>, Vec<_>) = words.into_iter().partition(|word| PARTS.contains(&word.as_str()));
+    let is_asked = |part: &str| parts.is_empty() || parts.iter().any(|word| word == part);
+    let name = names.first().map_or("knot:sides=79", String::as_str);
     let setup =
         if Path::new(name).exists() { io::load_setup(Path::new(name))? } else { scenes::build(name, 0.0)? };
     println!("{name}, {} threads", rayon::current_num_threads());
-    construction(&setup);
-    shading(&setup)?;
-    emission(&setup);
+    if is_asked("construction") {
+        construction(&setup);
+    }
+    if is_asked("shading") {
+        shading(&setup)?;
+    }
+    if is_asked("emission") {
+        emission(&setup);
+    }
     Ok(())
 }

@@ -161,13 +161,13 @@ impl Functions {
         (size_of_val(self.index.as_slice()) + size_of_val(self.nodes.words())) as u64
     }
 
-    /// V of the pixel in column `x`, row `y`, of its right neighbour, and of the two below, each at its own depth.
+    /// Where the nodes of four pixels lie: that in column `x`, row `y`, its right neighbour, and the two below. Outside of the
+    /// PDSM there are none.
     #[inline(always)]
-    pub fn four(&self, x: i32, y: i32, t: [f32; 4]) -> [f32; 4] {
+    pub(crate) fn four(&self, x: i32, y: i32) -> [[u32; 2]; 4] {
         let last = self.size as i32 - 1;
         if x < 0 || y < 0 || x >= last || y >= last {
-            let at = |i: i32| self.visibility(x + i % 2, y + i / 2, t[i as usize]);
-            return [at(0), at(1), at(2), at(3)];
+            return [0, 1, 2, 3].map(|i| self.range(x + i % 2, y + i / 2));
         }
         let place = y as usize * self.size as usize + x as usize;
         let starts = |place: usize| {
@@ -175,17 +175,24 @@ impl Functions {
             [[starts[0], starts[1]], [starts[1], starts[2]]]
         };
         let ([a, b], [c, d]) = (starts(place), starts(place + self.size as usize));
-        self.nodes.evaluate_four([a, b, c, d], t)
+        [a, b, c, d]
+    }
+
+    /// Where the nodes of the pixel in column `x`, row `y` lie.
+    #[inline]
+    fn range(&self, x: i32, y: i32) -> [u32; 2] {
+        let inside = 0..self.size as i32;
+        if !inside.contains(&x) || !inside.contains(&y) {
+            return [0; 2];
+        }
+        let pixel = y as usize * self.size as usize + x as usize;
+        [self.index[pixel], self.index[pixel + 1]]
     }
 
     /// V at `t` along the ray of the pixel in column `x`, row `y`; 1 outside of the PDSM, where no shadow falls.
     #[inline]
     pub fn visibility(&self, x: i32, y: i32, t: f32) -> f32 {
-        let inside = 0..self.size as i32;
-        if !inside.contains(&x) || !inside.contains(&y) {
-            return 1.0;
-        }
-        let pixel = y as usize * self.size as usize + x as usize;
-        self.nodes.evaluate(self.index[pixel] as usize..self.index[pixel + 1] as usize, t)
+        let [start, end] = self.range(x, y);
+        self.nodes.evaluate(start as usize..end as usize, t)
     }
 }

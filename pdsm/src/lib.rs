@@ -12,6 +12,7 @@ pub mod gpu;
 mod greedy;
 pub mod grid;
 pub mod layout;
+mod lookup;
 pub mod maps;
 pub mod nodes;
 mod params;

@@ -55,7 +55,7 @@ impl DepthSteps {
 
     /// The node that was packed, to half a step.
     #[inline]
-    pub fn unpack(self, node: PackedNode) -> Node {
+    pub(crate) fn unpack(self, node: PackedNode) -> Node {
         Node {
             t: self.start + (node.0 >> 16) as f32 * self.step,
             visibility: LOWEST + (node.0 & 0xffff) as f32 * VISIBILITY_STEP,
@@ -139,24 +139,6 @@ impl Nodes {
     }
 }
 
-impl Nodes {
-    /// [`evaluate`](Self::evaluate) of four functions, each at its own depth.
-    #[inline(always)]
-    pub(crate) fn evaluate_four(&self, ranges: [[u32; 2]; 4], t: [f32; 4]) -> [f32; 4] {
-        let of = |i: usize| ranges[i][0] as usize..ranges[i][1] as usize;
-        match self {
-            Self::Full(nodes) => {
-                let functions = [0, 1, 2, 3].map(|i| &nodes[of(i)]);
-                [0, 1, 2, 3].map(|i| evaluate_with(functions[i], t[i], |node| node))
-            }
-            Self::Packed(nodes, steps) => {
-                let functions = [0, 1, 2, 3].map(|i| &nodes[of(i)]);
-                [0, 1, 2, 3].map(|i| evaluate_with(functions[i], t[i], |node| steps.unpack(node)))
-            }
-        }
-    }
-}
-
 /// V at `t` of the function with these nodes: see [`Nodes::evaluate`].
 #[inline]
 pub fn evaluate(nodes: &[Node], t: f32) -> f32 {
@@ -173,7 +155,12 @@ fn evaluate_with<N: Copy>(nodes: &[N], t: f32, node: impl Fn(N) -> Node) -> f32 
     }
     let after = nodes.partition_point(|&n| node(n).t <= t);
     let Some(before) = after.checked_sub(1) else { return 1.0 };
-    let (a, b) = (node(nodes[before]), node(nodes[after]));
+    between(node(nodes[before]), node(nodes[after]), t)
+}
+
+/// V at `t` between two nodes.
+#[inline(always)]
+pub(crate) fn between(a: Node, b: Node, t: f32) -> f32 {
     // Both differences are positive: a.t ≤ t < b.t.
     let visibility = a.visibility + (b.visibility - a.visibility) * ((t - a.t) / (b.t - a.t));
     visibility.clamp(0.0, 1.0)

@@ -10,10 +10,10 @@ use gnomon_shadow_map::receiver_plane::view_tolerance;
 use rayon::prelude::*;
 use scene_core::Scene;
 
-use crate::cpu::{T_ERROR, read_before};
 use crate::events::EventStrips;
 use crate::grid::PixelGrid;
 use crate::layout::Layout;
+use crate::lookup::{T_ERROR, read_before};
 
 /// What rounding of positions adds to how far from its centre a pixel is read, in pixels.
 const ROUNDING: f32 = 1.0 / 64.0;
