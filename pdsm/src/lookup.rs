@@ -230,7 +230,12 @@ impl Lookup<'_> {
 
 #[inline(always)]
 fn locate(windows: &[Window], point: Vec3) -> Option<(usize, &Window, WindowPoint)> {
-    windows.iter().enumerate().find_map(|(i, window)| window.layout.locate(point).map(|at| (i, window, at)))
+    for (number, window) in windows.iter().enumerate() {
+        if let Some(at) = window.layout.locate(point) {
+            return Some((number, window, at));
+        }
+    }
+    None
 }
 
 impl Request {
@@ -322,20 +327,27 @@ impl Four {
     /// Finds V of all: see [`Nodes::evaluate`].
     #[inline(always)]
     fn search<N: Copy>(&mut self, nodes: &[N], node: impl Fn(N) -> Node) {
-        // Those whose depth is between their first node and their last one, and how many nodes the one before it may be.
+        let Some(most) = nodes.len().checked_sub(1) else { return };
+        // Both ends of each, without a branch that would wait for them. A function without nodes reads its neighbours'.
+        let (mut firsts, mut lasts) = ([0.0; FUNCTIONS], [[0.0; 2]; FUNCTIONS]);
+        for ((&[start, end], first), last) in
+            self.ranges[..self.count].iter().zip(&mut firsts).zip(&mut lasts)
+        {
+            *first = node(nodes[most.min(start as usize)]).t;
+            let Node { t, visibility } = node(nodes[(end as usize).max(1) - 1]);
+            *last = [t, visibility];
+        }
+        // Those whose depth is between their ends, and how many nodes the one before it may be.
         let (mut within, mut count) = ([0u8; FUNCTIONS], 0);
         let mut left = [0; FUNCTIONS];
-        let functions = self.ranges.iter().zip(&self.depths).zip(self.values.iter_mut().zip(&mut left));
-        for (k, ((&[start, end], &t), (value, left))) in functions.take(self.count).enumerate() {
-            if start == end {
-                continue;
-            }
-            let (first, last) = (node(nodes[start as usize]), node(nodes[end as usize - 1]));
-            let is_behind = last.t <= t;
-            *value = if is_behind { last.visibility.clamp(0.0, 1.0) } else { 1.0 };
-            *left = end - start - 1;
+        for k in 0..self.count {
+            let ([start, end], t) = (self.ranges[k], self.depths[k]);
+            let [last, behind] = lasts[k];
+            let is_behind = (start < end) & (last <= t);
+            self.values[k] = if is_behind { behind.clamp(0.0, 1.0) } else { 1.0 };
+            left[k] = end.saturating_sub(start + 1);
             within[count] = k as u8;
-            count += usize::from(first.t <= t && !is_behind);
+            count += usize::from((start < end) & (firsts[k] <= t) & !is_behind);
         }
         // One step of each in turn; those that are found leave.
         let (mut searched, mut rest) = (within, 0);
@@ -350,7 +362,8 @@ impl Four {
                 let half = left[k] / 2;
                 let middle = self.ranges[k][0] + half;
                 let is_before = node(nodes[middle as usize]).t <= self.depths[k];
-                self.ranges[k][0] = if is_before { middle } else { self.ranges[k][0] };
+                // A product: a branch would be guessed wrong every other time.
+                self.ranges[k][0] += half * u32::from(is_before);
                 left[k] -= half;
                 searched[still] = k as u8;
                 still += usize::from(left[k] > 1);
