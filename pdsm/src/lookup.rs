@@ -377,3 +377,68 @@ impl Four {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// V of a request, one function after the other.
+    fn apart(functions: &Functions, request: &Request) -> f32 {
+        let Request { pixel, t, slope, .. } = *request;
+        if !request.is_near() {
+            return 1.0;
+        }
+        let low = pixel.floor();
+        let weight = pixel - low;
+        let first = t - slope.dot(weight);
+        let at = |x: i32, y: i32, t| functions.visibility(low.x as i32 + x, low.y as i32 + y, t);
+        let (a, b) = (at(0, 0, first), at(1, 0, first + slope.x));
+        let (c, d) = (at(0, 1, first + slope.y), at(1, 1, first + slope.x + slope.y));
+        let (top, bottom) = (a + (b - a) * weight.x, c + (d - c) * weight.x);
+        top + (bottom - top) * weight.y
+    }
+
+    fn depth() -> impl Strategy<Value = f32> {
+        prop_oneof![
+            4 => (-10i32..10).prop_map(|t| t as f32),
+            4 => -10.0f32..10.0,
+            1 => Just(f32::NAN),
+            1 => Just(f32::INFINITY),
+        ]
+    }
+
+    proptest! {
+        /// Side by side is one after the other, bit for bit: before, between, at and behind nodes, beside the PDSM, in functions
+        /// without nodes, and for what is no number.
+        #[test]
+        fn side_by_side_is_one_after_the_other(
+            functions in prop::collection::vec(prop::collection::vec((-8i32..8, -0.1f32..1.1), 0..40), 9),
+            requests in prop::collection::vec((-2.0f32..4.0, -2.0f32..4.0, depth(), -1.0f32..1.0, -1.0f32..1.0), 0..=BATCH),
+            far in prop_oneof![Just(f32::NAN), Just(f32::INFINITY), Just(-1e7f32)],
+        ) {
+            let (mut nodes, mut index) = (Vec::new(), vec![0]);
+            for mut function in functions {
+                function.sort_by_key(|node| node.0);
+                nodes.extend(function.iter().map(|&(t, visibility)| Node { t: t as f32, visibility }));
+                index.push(nodes.len() as u32);
+            }
+            let mut requests: Vec<_> = requests
+                .iter()
+                .map(|&(x, y, t, dx, dy)| Request { pixel: Vec2::new(x, y), t, slope: Vec2::new(dx, dy), ..Default::default() })
+                .collect();
+            if let Some(request) = requests.last_mut() {
+                request.pixel.x = far;
+            }
+            for nodes in [Nodes::packed(&nodes), Nodes::Full(nodes)] {
+                let functions = Functions::from_parts(3, index.clone(), nodes, Default::default()).expect("ascending nodes");
+                let mut found = [1.0; BATCH];
+                bilinear(&functions, &requests, &mut found);
+                for (request, found) in requests.iter().zip(found) {
+                    prop_assert_eq!(found.to_bits(), apart(&functions, request).to_bits());
+                }
+            }
+        }
+    }
+}
