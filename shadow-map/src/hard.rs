@@ -12,7 +12,7 @@ use crate::cpu;
 use crate::light_maps::{LightMaps, Receiver, ShadowMapView};
 use crate::patches::{Form, Outcome, Patch, PatchRow, Questions, patches_of};
 use crate::receiver_plane::{is_behind, is_near, meets, rises_above};
-use crate::texel_outcomes::TexelOutcomes;
+use crate::texel_outcomes::{TexelOutcomes, patches_pay};
 
 impl LightMaps<'_> {
     /// V of one receiver, 0 or 1.
@@ -89,7 +89,7 @@ pub(crate) struct Hard<'a> {
 
 impl PreparedVariant for Hard<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage, report: &mut Report) {
-        if self.skip {
+        if self.skip && patches_pay(&self.maps, gbuffer, [0.0; 2]) {
             let known = report.time("shade.lookup", |_| {
                 let patches = patches_of(&self.maps.scene, gbuffer);
                 self.maps.shade_hard(gbuffer, &patches, &mut visibility.values)
@@ -99,6 +99,7 @@ impl PreparedVariant for Hard<'_> {
             report.time("shade.lookup", |_| {
                 cpu::shade_pixels(&self.maps, gbuffer, visibility, |receiver| self.maps.hard(receiver));
             });
+            report.skip("lookups", 0);
         }
     }
 

@@ -21,7 +21,7 @@ use crate::patches::{Form, Outcome, Patch, Questions, patches_of};
 use crate::pixel_hash::pixel_numbers;
 use crate::poisson_disk::poisson_disk;
 use crate::taps::{Stored, Taps};
-use crate::texel_outcomes::{TexelOutcomes, bits};
+use crate::texel_outcomes::{TexelOutcomes, bits, patches_pay};
 
 /// The variant: maps and a filter.
 #[derive(Debug)]
@@ -101,14 +101,14 @@ impl Filter {
         report: &mut Report,
     ) {
         let lit = report.time("shade.filter", |_| {
-            if !maps.skip {
-                let one = |receiver: &Receiver, lit: &mut u64| answer(receiver, None, lit);
-                return cpu::filter_pixels(&maps.maps, gbuffer, visibility, one);
-            }
             let reach = match self {
                 Self::Grid(side) => [f64::from(*side) * 0.5, f64::from(*side) * 0.5 + 1.0],
                 Self::Disk { radius, .. } => [f64::from(*radius) + 1.0; 2],
             };
+            if !maps.skip || !patches_pay(&maps.maps, gbuffer, reach) {
+                let one = |receiver: &Receiver, lit: &mut u64| answer(receiver, None, lit);
+                return cpu::filter_pixels(&maps.maps, gbuffer, visibility, one);
+            }
             let fill = |patch: &Patch, questions: &mut Questions, outcomes: &mut TexelOutcomes| {
                 outcomes.fill(&maps.maps, patch, questions, form, reach, &object_of)
             };

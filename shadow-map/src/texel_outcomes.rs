@@ -1,14 +1,15 @@
 //! What each texel that a patch is looked up in is to the patch: see [`patches`](crate::patches).
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
+use scene_core::GBuffer;
 
 use crate::light_maps::{LightMaps, ShadowMapView};
 use crate::light_views::TexelBounds;
-use crate::patches::{Form, Outcome, Patch, Questions};
+use crate::patches::{Form, Outcome, Patch, Questions, TILE};
 
 /// Columns of a table, at most: a row's outcomes are the bits of two words.
 const MOST_COLUMNS: usize = 64;
-/// Texels of a table, at most: with more than some a pixel it would not pay.
+/// Texels of a table, at most.
 const MOST_TEXELS: usize = 1024;
 
 /// The texels around a patch in the one view that holds all of it.
@@ -33,7 +34,8 @@ struct Row {
 
 impl TexelOutcomes {
     /// Fills the table for lookups that read `before` texels to the left of and above the receiver's place, and `after` to
-    /// the right and below, in texels. False if no one view surely holds all of them, or if they are too many.
+    /// the right and below, in texels. False if no one view surely holds all of them, or if they are more than the pixels would
+    /// read one by one: to ask for a texel costs about as much as to read it.
     ///
     /// `object_of` is asked by [`Form::Ids`] for the object in a texel of a view.
     pub fn fill(
@@ -62,7 +64,8 @@ impl TexelOutcomes {
         let first = (min - before).floor().as_ivec2().to_array();
         let last = (max + after).floor().as_ivec2().to_array();
         let [columns, rows] = [0, 1].map(|axis| (last[axis] - first[axis]) as usize + 1);
-        if columns > MOST_COLUMNS || columns * rows > MOST_TEXELS {
+        let reads = patch.mask.count_ones() as usize * (before + after + 1.0).powi(2) as usize;
+        if columns > MOST_COLUMNS || columns * rows > MOST_TEXELS.min(reads) {
             return false;
         }
         (self.view, self.first, self.columns, self.has) = (view, first, columns, [false; 3]);
@@ -133,6 +136,44 @@ impl TexelOutcomes {
         (column < self.columns && column + count as usize <= self.columns)
             .then(|| [bits.blocks, bits.unknown].map(|bits| u128::from(bits >> column & mask)))
     }
+}
+
+/// Of the tiles a side, one in so many is looked at by [`patches_pay`].
+const PAY_STEP: usize = 4;
+
+/// What finding the patches of a tile costs, in reads of a texel: a fifth to a quarter of 64, measured on `ball`, `layers`, `edges` and
+/// `pool` at 512² with maps so fine that no patch is asked as one. It decides about time alone.
+const TILE_READS: f64 = 16.0;
+
+/// Whether asking the pixels of a patch together takes fewer reads than asking each, judged by the texels between the corners of some
+/// tiles. Maps finer than the image have more texels in a patch than it has pixels.
+pub(crate) fn patches_pay(maps: &LightMaps<'_>, gbuffer: &GBuffer, [before, after]: [f64; 2]) -> bool {
+    let [width, height] = [gbuffer.width, gbuffer.height].map(|side| side as usize);
+    let mut balance = 0.0;
+    for y in (0..height.saturating_sub(TILE - 1)).step_by(TILE * PAY_STEP) {
+        for x in (0..width.saturating_sub(TILE - 1)).step_by(TILE * PAY_STEP) {
+            let corners = [[0, 0], [TILE - 1, 0], [0, TILE - 1], [TILE - 1, TILE - 1]];
+            let corners = corners.map(|[right, down]| (y + down) * width + x + right);
+            if corners.iter().all(|&pixel| !gbuffer.is_seen(pixel)) {
+                continue;
+            }
+            balance -= TILE_READS;
+            if corners.iter().any(|&pixel| gbuffer.triangle[pixel] != gbuffer.triangle[corners[0]]) {
+                continue;
+            }
+            let found = maps.maps.iter().find_map(|map| {
+                let [a, b, c, d] = corners.map(|pixel| map.view.project(gbuffer.position[pixel]));
+                Some(([a?, b?, c?, d?], f64::from(map.map.width) * 0.5))
+            });
+            let Some((places, scale)) = found else { continue };
+            let low = places.into_iter().fold(Vec2::INFINITY, Vec2::min);
+            let high = places.into_iter().fold(Vec2::NEG_INFINITY, Vec2::max);
+            let sides = (high - low).as_dvec2() * scale + (before + after + 1.0);
+            let reads = (TILE * TILE) as f64 * (before + after + 1.0).powi(2);
+            balance += (reads - sides.x * sides.y).max(0.0);
+        }
+    }
+    balance > 0.0
 }
 
 /// The bits that are set, from the lowest on.
