@@ -97,6 +97,7 @@ pub(crate) fn csv(records: &[Record]) -> Result<Vec<u8>, CliError> {
 /// For a terminal: the means over soft scenes, the Pareto front of every scene, fastest first, and the cost curves.
 pub(crate) fn text(records: &[Record]) -> String {
     let mut text = overall(records);
+    text.push_str(&fronts(records));
     for (scene, records) in by_scene(records) {
         let places = places(records.iter().copied(), Time::Whole, Error::Rmse);
         text.push_str(&format!("{scene}\n{}\n", front(&places)));
@@ -121,6 +122,37 @@ fn overall(records: &[Record]) -> String {
         text.push_str(&format!("{} soft scenes, geometric means, {what}\n{}\n", soft.len(), front(&means)));
     }
     text
+}
+
+/// On the front of how many scenes each technique is with one of its contenders, whole and while only the camera moves, and of
+/// which one it is with the most.
+fn fronts(records: &[Record]) -> String {
+    let scenes = by_scene(records);
+    if scenes.len() < 2 {
+        return String::new();
+    }
+    let heading = ["on the front of so many scenes", "whole", "frame", "mostly on"];
+    let mut lines = vec![heading.map(str::to_owned)];
+    let mut on: BTreeMap<&str, [BTreeMap<&str, usize>; 2]> = BTreeMap::new();
+    for record in records {
+        on.entry(&record.technique).or_default();
+    }
+    for (scene, records) in &scenes {
+        for (index, time) in [Time::Whole, Time::Frame].into_iter().enumerate() {
+            for place in pareto(&places(records.iter().copied(), time, Error::Rmse)) {
+                if let Some(scenes) = on.get_mut(&*place.technique) {
+                    *scenes[index].entry(scene).or_insert(0) += 1;
+                }
+            }
+        }
+    }
+    for (technique, [whole, frame]) in &on {
+        let most = whole.iter().chain(frame).max_by_key(|(_, count)| **count);
+        let most = most.map_or("-", |(scene, _)| scene);
+        let of = |on: &BTreeMap<&str, usize>| format!("{} of {}", on.len(), scenes.len());
+        lines.push([format!("  {technique}"), of(whole), of(frame), most.to_owned()]);
+    }
+    format!("{}\n", aligned(&lines))
 }
 
 /// The places that nothing beats, beside what ray tracing takes for the same error, plain and with skipping.
@@ -193,6 +225,16 @@ mod tests {
         let text = text(&records);
         // On one of the two scenes, and in both means.
         assert_eq!(text.matches("  shadow-map hard ").count(), 3, "{text}");
+        let of = |technique: &str| {
+            let mut lines = text.lines().skip_while(|line| !line.contains("on the front"));
+            let line = lines.find(|line| line.trim_start().starts_with(technique)).unwrap();
+            line.split_whitespace().skip(1).take(6).collect::<Vec<_>>().join(" ")
+        };
+        assert_eq!(
+            (of("shadow-map "), of("rays ")),
+            ("1 of 2 1 of 2".into(), "2 of 2 2 of 2".into()),
+            "{text}"
+        );
         assert!(text.matches("  rays 4 ").count() >= 2, "{text}");
         assert!(text.contains("2 soft scenes"), "{text}");
     }
