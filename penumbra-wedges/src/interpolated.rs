@@ -13,6 +13,9 @@
 //! On a side plane S rises linearly from the back to the front plane of the wedge, 0 to 1: with the vertex v, the light's
 //! middle O and the plane's own normal N, the ray from a point x of the plane through v passes O at the distance
 //! `(x − v)·N·|v − O| / ((x − v)·(v − O)/|v − O|)`, and S = (1 + distance / radius) / 2, the radius being the light's reach along N.
+//! For the point where the line through p along the edge meets the plane that comes to −w·c / (N·c), with w = v − O and
+//! c = (p − v) × (b − a): that point is p − v − e·(n·(p − v))/(n·e) with n = w × N and e along the edge, whose products with N and w are w·c and
+//! −|w|²·N·c over n·e. Nothing cancels in it, and w·c, like c, is the same from both ends.
 //! Both neighbours find the same S there, so V is continuous (C⁰). A receiver of the hard shadow (S < ½) has one layer less by
 //! S, one outside has one more by 1 − S: `V = 1 − layers + Σ m·(S or S − 1)`.
 
@@ -36,17 +39,18 @@ pub struct Side {
     inward: DVec3,
     /// The unit vector N in the plane that leads out of the hard shadow of a silhouette that runs with the edge.
     outward: DVec3,
+    /// 1 if `inward` is (vertex − O) × N, −1 if it is the other way round.
+    turn: f64,
 }
 
 impl Side {
     /// The side planes of all edges of a silhouette, at their beginning and their end.
     pub fn of_edges(light: &AreaLight, edges: &[CandidateEdge]) -> Vec<[Self; 2]> {
         // The edges at each vertex, turned so that all of them have a positive m.
-        let mut at_vertex: HashMap<[u32; 3], Vec<(usize, DVec3)>> = HashMap::new();
+        let mut at_vertex: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
         for (index, edge) in edges.iter().enumerate() {
-            let normal = outward_normal(light, edge);
             for vertex in [edge.a, edge.b] {
-                at_vertex.entry(key(vertex)).or_default().push((index, normal));
+                at_vertex.entry(key(vertex)).or_default().push(index);
             }
         }
         edges
@@ -54,25 +58,17 @@ impl Side {
             .enumerate()
             .map(|(index, edge)| {
                 [(edge.a, edge.b), (edge.b, edge.a)].map(|(vertex, other)| {
-                    let own = outward_normal(light, edge);
-                    // With more or fewer than one neighbour the wedge ends across its edge.
-                    let neighbour = match at_vertex.get(&key(vertex)).map(Vec::as_slice) {
-                        Some([a, b]) => {
-                            if a.0 == index {
-                                b.1
-                            } else {
-                                a.1
-                            }
-                        }
-                        _ => own,
-                    };
                     let away = -light.from_point(vertex.as_dvec3());
-                    let mean = (own + neighbour).try_normalize().unwrap_or(own);
+                    // With more or fewer than one neighbour the wedge ends across its edge.
+                    let mean = match at_vertex.get(&key(vertex)).map(Vec::as_slice) {
+                        Some(&[a, b]) => mean_normal(light, [edge, &edges[a + b - index]], vertex),
+                        _ => outward_normal(light, edge),
+                    };
                     // Across the way to the light: both normals are, and so is their mean.
                     let inward = away.cross(mean);
                     let along = (other - vertex).as_dvec3();
-                    let inward = if inward.dot(along) < 0.0 { -inward } else { inward };
-                    Self { inward, outward: mean }
+                    let turn = if inward.dot(along) < 0.0 { -1.0 } else { 1.0 };
+                    Self { inward: inward * turn, outward: mean, turn }
                 })
             })
             .collect()
@@ -128,6 +124,31 @@ fn outward_normal(light: &AreaLight, edge: &CandidateEdge) -> DVec3 {
     (if edge.fixed > 0 { -normal } else { normal }).normalize_or_zero()
 }
 
+/// The unit vector between the outward normals of two edges that meet at a vertex; that of the first where it has none.
+///
+/// Where an outline turns back on itself, as the light sees it, the normals p and q are all but opposite, and rounding rules their sum.
+/// All three are across the way w from the light, so that p + q, as long as it is not 0, is along (p − q) × w, which is long there;
+/// turned to p's side: ((p − q) × w)·p = −w·(p × q). With x and y the edges from the vertex, p is along ±x × w and q along ±y × w,
+/// and (x × w) × (y × w) = w·(w·(x × y)): what decides is one determinant of given coordinates.
+fn mean_normal(light: &AreaLight, edges: [&CandidateEdge; 2], vertex: Vec3) -> DVec3 {
+    let [p, q] = edges.map(|edge| outward_normal(light, edge));
+    if p.dot(q) >= 0.0 {
+        return (p + q).try_normalize().unwrap_or(p);
+    }
+    let away = -light.from_point(vertex.as_dvec3());
+    // Whether x × w leads out of the hard shadow: as receivers see it, edge × w does where the multiplicity is positive.
+    let leads_out = edges.map(|edge| (edge.fixed > 0) == (edge.a == vertex));
+    let [x, y] =
+        edges.map(|edge| (if edge.a == vertex { edge.b } else { edge.a }).as_dvec3() - vertex.as_dvec3());
+    let volume = away.dot(x.cross(y));
+    if volume == 0.0 {
+        return p;
+    }
+    let is_turned = (volume < 0.0) == (leads_out[0] == leads_out[1]);
+    let across = (p - q).cross(away);
+    (if is_turned { across } else { -across }).try_normalize().unwrap_or(p)
+}
+
 /// What is asked for V.
 #[derive(Clone, Copy, Debug)]
 pub struct Interpolated<'a> {
@@ -154,8 +175,9 @@ impl Interpolated<'_> {
             let edge = &wedges.edges.candidates[index as usize];
             if let Some(share) = share(&wedges.light, edge, &self.middle.sides[index as usize], place) {
                 inside = true;
+                // A triangle blocks at its border, too: the very middle is in the hard shadow.
                 let layers = f64::from(edge.fixed.abs());
-                sum += layers * if share < 0.5 { share } else { share - 1.0 };
+                sum += layers * if share <= 0.5 { share } else { share - 1.0 };
             }
         }
         work.penumbra += u64::from(inside);
@@ -175,22 +197,22 @@ impl Interpolated<'_> {
 fn share(light: &AreaLight, edge: &CandidateEdge, sides: &[Side; 2], place: DVec3) -> Option<f64> {
     let ends = [edge.a, edge.b].map(Vec3::as_dvec3);
     let along = ends[1] - ends[0];
+    let across = (place - ends[0]).cross(along);
+    // The same from both ends: they differ by `along`.
+    let height_over_edge = -light.from_point(ends[0]).dot(across);
     let mut distances = [0.0; 2];
     let mut shares = [0.0; 2];
     for (i, (side, vertex)) in sides.iter().zip(ends).enumerate() {
-        let way = if i == 0 { along } else { -along };
-        let (height, slope) = (side.inward.dot(place - vertex), side.inward.dot(way));
-        if height < 0.0 || slope <= 0.0 {
+        let slope = side.inward.dot(if i == 0 { along } else { -along });
+        let height = side.inward.dot(place - vertex);
+        let lean = side.outward.dot(across);
+        // What is not behind the vertex as the light sees it is in no shadow of the edge.
+        let behind = if i == 0 { -lean * side.turn } else { lean * side.turn };
+        if height < 0.0 || slope <= 0.0 || behind <= 0.0 {
             return None;
         }
         distances[i] = height / slope;
-        let from_vertex = place - way * distances[i] - vertex;
-        let away = -light.from_point(vertex);
-        let behind = from_vertex.dot(away);
-        if behind <= 0.0 {
-            return None;
-        }
-        let offset = from_vertex.dot(side.outward) * away.length_squared() / behind;
+        let offset = -height_over_edge / lean;
         shares[i] = ((1.0 + offset / reach_of(light, side)) * 0.5).clamp(0.0, 1.0);
     }
     let [left, right] = distances;
@@ -241,6 +263,42 @@ mod tests {
                 share(&light, &edges[i], &sides[i], inside).unwrap()
             });
             assert!((shares[0] - shares[1]).abs() < 1e-6, "{s} {t}: {shares:?}");
+        }
+    }
+
+    #[test]
+    fn an_outline_that_turns_back_has_a_mean_normal() {
+        for light in [
+            Light::Sphere { center: Vec3::Y * 3.0, radius: 0.6 },
+            Light::Directional { direction: Vec3::new(0.1, -1.0, 0.0), angular_radius: 0.1 },
+        ] {
+            let light = AreaLight::new(&light).unwrap();
+            let vertex = Vec3::new(0.25, 0.5, -0.125);
+            let away = -light.from_point(vertex.as_dvec3());
+            for (way, turn) in [(1.0, 0.5), (1.0, -1e-3), (-1.0, 0.7), (-1.0, 1e-6), (1.0, 1e-6)] {
+                let ends = [Vec3::X + Vec3::Y * 0.3, Vec3::new(way, 0.25, turn)].map(|way| vertex + way);
+                for bits in 0..16 {
+                    let [p, q] = [0, 1].map(|i| {
+                        let fixed = if bits >> i & 1 == 1 { 1 } else { -1 };
+                        let [a, b] =
+                            if bits >> (i + 2) & 1 == 1 { [vertex, ends[i]] } else { [ends[i], vertex] };
+                        CandidateEdge::fixed(a, b, fixed)
+                    });
+                    let mean = mean_normal(&light, [&p, &q], vertex);
+                    let same = mean_normal(&light, [&q, &p], vertex);
+                    assert!((mean - same).length() < 1e-12, "{mean} {same}: both sides of a plane are one");
+                    assert!(
+                        (mean.length() - 1.0).abs() < 1e-12 && mean.dot(away).abs() < 1e-12 * away.length()
+                    );
+                    let sum = outward_normal(&light, &p) + outward_normal(&light, &q);
+                    // Rounding of the sum is 2⁻⁵² of 1, and it is no shorter than 10⁻⁷.
+                    assert!((mean - sum.normalize()).length() < 1e-8, "{way} {turn} {bits}: {mean} {sum}");
+                }
+            }
+            // All the way back: each edge ends across itself.
+            let edge = CandidateEdge::fixed(vertex, vertex + Vec3::X, 1);
+            let back = CandidateEdge::fixed(vertex + Vec3::X * 2.0, vertex, 1);
+            assert_eq!(mean_normal(&light, [&edge, &back], vertex), outward_normal(&light, &edge));
         }
     }
 }

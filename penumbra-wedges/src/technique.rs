@@ -39,9 +39,6 @@ impl ShadowTechnique for PenumbraWedges {
             Capability::Gpu if !cfg!(feature = "gpu") => {
                 Support::Unsupported("built without the feature 'gpu'")
             }
-            Capability::Gpu if self.params.variant == Variant::Interpolated => {
-                Support::Unsupported(ON_CPU_ALONE)
-            }
             Capability::Gpu => Support::Exact,
         };
         Description::new(SUMMARY, support)
@@ -68,13 +65,6 @@ impl ShadowTechnique for PenumbraWedges {
         device: &wgpu::Device,
         visibility: wgpu::TextureFormat,
     ) -> Result<Box<dyn GpuShadowTechnique>, TechniqueError> {
-        if self.params.variant == Variant::Interpolated {
-            return Err(TechniqueError::Unsupported {
-                technique: WedgeParams::TECHNIQUE,
-                input: "variant interpolated on the GPU".to_owned(),
-                why: ON_CPU_ALONE.to_owned(),
-            });
-        }
         Ok(Box::new(PenumbraWedgesOnGpu::new(device, self.params, visibility)))
     }
 }
@@ -119,8 +109,6 @@ impl PreparedShadow for PreparedWedges<'_> {
         false
     }
 }
-
-const ON_CPU_ALONE: &str = "`interpolated` has a CPU path alone";
 
 const SUMMARY: &str = "soft shadow volumes: penumbra wedges around edges, up to exact";
 

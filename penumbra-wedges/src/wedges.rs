@@ -57,8 +57,10 @@ impl Wedges {
         report: &mut Report,
     ) -> Self {
         let scene = casters.scene;
+        // The wedges of `interpolated` reach beyond the ways to the light, and have their side planes from neighbours.
+        let skip = params.skip && params.variant != Variant::Interpolated;
         let relevant =
-            report.time("prepare.relevance", |report| casters.relevant(light, camera, params.skip, report));
+            report.time("prepare.relevance", |report| casters.relevant(light, camera, skip, report));
         let (face_sides, traced) = report.time("prepare.facing", |_| {
             let mut sides = casters.for_faces(FaceSide::None, |face| side_of(&area, scene.corners(face)));
             let near =

@@ -139,7 +139,7 @@ fn the_gpu_answers_as_well() {
     let Some(gpu) = testing::gpu() else { return };
     let cases =
         scenes_without_area().into_iter().map(|scene| (scene, CAMERA, LIGHTS)).chain(SCALES.map(stress_list));
-    let mut on_gpu = [Variant::Coverage, Variant::Exact].map(|variant| {
+    let mut on_gpu = VARIANTS.map(|variant| {
         let params = WedgeParams { variant, views: 32, rays: false, ..Default::default() };
         PenumbraWedgesOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT)
     });

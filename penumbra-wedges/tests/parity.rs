@@ -104,7 +104,7 @@ fn check(gpu: &Gpu, case: &Case<'_>, params: WedgeParams) -> [u32; 3] {
     counts
 }
 
-const VARIANTS: [Variant; 2] = [Variant::Coverage, Variant::Exact];
+const VARIANTS: [Variant; 3] = [Variant::Interpolated, Variant::Coverage, Variant::Exact];
 
 #[test]
 fn built_in_scenes() {
@@ -116,7 +116,7 @@ fn built_in_scenes() {
         "cylinder",
         "log-cabin",
         "knot",
-        "street:length=100",
+        "street",
         "edges",
         "layers",
         "park:leaves=300",

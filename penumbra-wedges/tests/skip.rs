@@ -2,15 +2,22 @@
 
 mod truth;
 
+use glam::Vec3;
 use gnomon_penumbra_wedges::{Casters, PenumbraWedges, Variant, WedgeParams};
-use scene_core::{Camera, Light, Report, Scene, VisibilityImage, raster, scenes};
-use truth::shade;
+use scene_core::{Camera, Light, Report, Scene, TriangleMesh, VisibilityImage, raster, scenes};
+use truth::{camera, scene_of, shade, sheet};
 
-/// Images with skipping on and off; the report of the first.
-fn compare(scene: &Scene, light: &Light, camera: &Camera, params: WedgeParams) -> Report {
+/// How many pixels differ by a bit between the images with skipping on and off; the report of the first.
+fn differing(scene: &Scene, light: &Light, camera: &Camera, params: WedgeParams) -> (usize, Report) {
     let (_, with, report) = shade(scene, light, camera, params);
     let (_, without, _) = shade(scene, light, camera, WedgeParams { skip: false, ..params });
-    let wrong = with.values.iter().zip(&without.values).filter(|(a, b)| a.to_bits() != b.to_bits()).count();
+    let differ = with.values.iter().zip(&without.values).filter(|(a, b)| a.to_bits() != b.to_bits());
+    (differ.count(), report)
+}
+
+/// The report with skipping on; no pixel may differ.
+fn compare(scene: &Scene, light: &Light, camera: &Camera, params: WedgeParams) -> Report {
+    let (wrong, report) = differing(scene, light, camera, params);
     assert_eq!(wrong, 0, "{params:?}");
     report
 }
@@ -50,10 +57,64 @@ fn the_same_pixels_are_traced() {
     assert_eq!(with.traced, without.traced);
 }
 
+/// Every built-in scene by every variant that takes it, seen whole and by a narrow view that most casters are out of.
+#[test]
+fn no_built_in_scene_changes() {
+    let mut changed = Vec::new();
+    for built_in in scenes::all() {
+        // Small plants: without skipping, every pixel asks every edge.
+        let spec = match built_in.name {
+            "forest" => "forest:triangles=20000",
+            "park" => "park:leaves=200",
+            "street" => "street:length=60",
+            name => name,
+        };
+        let setup = scenes::build(spec, 0.0).expect("built in");
+        let takes_all = Casters::new(&setup.scene).expect("edges").masked().is_none();
+        for fov_y in [setup.camera.fov_y, 0.15 * setup.camera.fov_y] {
+            let camera = Camera { fov_y, ..setup.camera.with_size(40, 30) };
+            let variants = [Variant::Exact, Variant::Coverage, Variant::Interpolated];
+            for &variant in if takes_all { &variants[..] } else { &variants[..1] } {
+                let params = WedgeParams { variant, rays: false, ..Default::default() };
+                for light in &setup.lights {
+                    let (wrong, _) = differing(&setup.scene, light, &camera, params);
+                    if wrong > 0 {
+                        changed.push(format!("{spec}, {variant:?}, {fov_y} rad: {wrong} of 1200 pixels"));
+                    }
+                }
+            }
+        }
+    }
+    assert!(changed.is_empty(), "{changed:#?}");
+}
+
 #[test]
 fn casters_out_of_view_are_left_out() {
     let setup = scenes::build("log-cabin", 0.0).expect("built in");
     let camera = Camera { fov_y: 0.1, ..setup.camera.with_size(48, 36) };
     let report = compare(&setup.scene, &setup.lights[0], &camera, WedgeParams::default());
     assert!(report.skipped["casters outside view"] > 0);
+}
+
+/// The wedges of `interpolated` reach beyond the ways to a flat light: along a normal askew to a long light's sides they are as wide as the
+/// light's shadow on that normal, though nothing of the light is there. A caster beside all ways from what is seen to the light counts.
+#[test]
+fn casters_beside_the_ways_to_the_light_count_for_interpolated() {
+    let light = Light::Rect { center: Vec3::Y * 4.0, half_u: Vec3::X * 1.5, half_v: Vec3::Z * 0.02 };
+    // Askew by an eighth of a turn, from its edge through the middle line away from what is seen.
+    let (along, out) = (Vec3::new(0.21, 0.0, -0.21), Vec3::new(1.0, 0.0, 1.0));
+    let corners = [-along, along, along + out, -along + out].map(|p| p + Vec3::Y * 2.0);
+    let scene = scene_of(&[
+        sheet(0.0, [-4.0, -4.0], [4.0, 4.0]),
+        TriangleMesh::new("askew", corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]),
+    ]);
+    let seen = Vec3::new(-0.64, 0.0, -0.64);
+    let view = Camera { up: Vec3::X, fov_y: 0.1, ..camera(seen + Vec3::Y * 0.5, seen, 12, 12) };
+    let exact = WedgeParams { variant: Variant::Exact, ..Default::default() };
+    let (_, image, report) = shade(&scene, &light, &view, exact);
+    assert!(report.skipped["casters outside view"] > 0 && image.values.iter().all(|&v| v == 1.0));
+    let params = WedgeParams { variant: Variant::Interpolated, ..exact };
+    compare(&scene, &light, &view, params);
+    let (_, image, _) = shade(&scene, &light, &view, params);
+    assert!(image.values.iter().all(|&v| v < 0.99), "its wedge holds all that is seen: {:?}", image.values);
 }

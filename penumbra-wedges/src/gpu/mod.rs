@@ -3,9 +3,10 @@
 //! | pass | what it does | twin |
 //! | --- | --- | --- |
 //! | `prepare.facing` | how each face lies to the light, once a triangle | [`edges::side_of`](crate::edges::side_of) |
-//! | `prepare.silhouette` | edges that are silhouettes from some point of the light | [`Edges`](crate::edges::Edges) |
+//! | `prepare.silhouette` | edges that are silhouettes from some point of the light, or from its middle | [`Edges`](crate::edges::Edges) |
+//! | `prepare.sides` | for `interpolated`: the side planes that neighbours share | [`Side`](crate::interpolated::Side) |
 //! | `shade.blocks` | edges against blocks of 64 × 64 pixels | `cpu`'s strips |
-//! | `shade.wedges` | the rest against tiles of 8 × 8 pixels, and what is left drawn for each pixel | `cpu`, [`exact`](crate::exact), [`coverage`](crate::coverage) |
+//! | `shade.wedges` | the rest against tiles of 8 × 8 pixels, and what is left drawn for each pixel | `cpu`, [`exact`](crate::exact), [`coverage`](crate::coverage), [`interpolated`](crate::interpolated) |
 //! | `shade.rays` | one exact ray for each pixel that was counted | [`Bvh`](scene_core::bvh::Bvh) |
 //! | `shade.traced` | rays to all samples of pixels that were not | [`Exact::traced`](crate::exact::Exact::traced) |
 //! | `shade.write` | V | |
@@ -15,16 +16,19 @@
 //! a buffer of light intensity. That buffer needs blending of floats or a format with a sign, in any order; every wedge is rasterised
 //! over all that it covers; and depth complexity, one count for each of 256 samples, does not fit into a pixel. Here a tile
 //! gathers the edges of all wedges it may lie in ([`shaft`](shaders): the planes that bound a wedge, asked from the receivers' end, which
-//! needs nothing to be kept for an edge), and sums over them in registers, integers for `exact`: no order of edges changes a sum.
+//! needs nothing to be kept for an edge; the wedges of `interpolated`, which are wider, by their own planes), and sums over them in
+//! registers, in integers: no order of edges changes a sum.
 //!
 //! # A limit of one driver
 //! Mesa's software Vulkan ends all loops of an invocation after 65,535 rounds together. A tile whose block has millions of edges, or more
-//! than some hundred thousand edges and samples to count, loses some there; no hardware does that.
+//! than some hundred thousand edges and samples to count, loses some there; no hardware does that. For sums of areas and shares a round takes four
+//! edges: tiles at the horizon of the built-in street have some hundred thousand.
 //!
 //! # Exactness
 //! What decides about topology, the facing of faces with the light on both sides, is asked exactly (`scene_core::predicates`). Places
 //! on the light's plane are f32: an outline is off by some 10⁻⁶ of the light, and neighbours compare with the same numbers, as on
-//! the CPU. Pixels close to a flat light's plane, where f32 does not suffice, are traced.
+//! the CPU. Where half of the light hangs on a sign that the ray to the light's middle has to agree with, that is asked exactly, too: on which side
+//! of the middle an edge passes. Pixels close to a flat light's plane, where f32 does not suffice, are traced.
 
 pub mod layout;
 mod passes;
@@ -66,6 +70,8 @@ pub struct PenumbraWedgesOnGpu {
     counters: WorkBuffer,
     candidates: WorkBuffer,
     variable: WorkBuffer,
+    corners: WorkBuffer,
+    sides: WorkBuffer,
     pixels: WorkBuffer,
     lists: WorkBuffer,
     no_masks: HeldBuffer,
@@ -100,6 +106,8 @@ impl PenumbraWedgesOnGpu {
             counters: WorkBuffer::new("counters"),
             candidates: WorkBuffer::new("edges that count"),
             variable: WorkBuffer::new("faces on both sides of the light"),
+            corners: WorkBuffer::new("edges at vertices"),
+            sides: WorkBuffer::new("side planes"),
             pixels: WorkBuffer::new("states of pixels"),
             lists: WorkBuffer::new("edges of blocks"),
             no_masks: HeldBuffer::storage("no masks"),
@@ -138,7 +146,15 @@ impl PenumbraWedgesOnGpu {
         let facing: Bound = self.facing.get(device, 4 * u64::from(tables.triangles))?.into();
         let counters = self.counters.get(device, 4 * COUNTERS)?;
         let candidates = self.candidates.get(device, candidate_bytes(&tables))?;
-        let variable = self.variable.get(device, variable_bytes(&tables))?;
+        let interpolated = self.params.variant == Variant::Interpolated;
+        // Of its edges no face is asked from receivers; what meets at their ends is noted instead.
+        let noted = if interpolated {
+            let corners = self.corners.get(device, 8 * u64::from(tables.vertices.max(1)))?;
+            recorder.encoder.clear_buffer(&corners, 0, None);
+            corners
+        } else {
+            self.variable.get(device, variable_bytes(&tables))?
+        };
         recorder.encoder.clear_buffer(&counters, 0, None);
         let scene = self.scene.groups(device, &query.scene);
         // A light of no extent has no wedges: one ray a pixel.
@@ -151,18 +167,31 @@ impl PenumbraWedgesOnGpu {
             let triangles = workgroups(tables.triangles);
             self.passes.find_facing.pass.record(recorder, "prepare.facing", &groups, triangles);
             let own = [
-                settings,
+                settings.clone(),
                 tables.edges.clone().into(),
                 tables.incident.clone().into(),
                 facing,
-                counters.into(),
-                candidates.into(),
-                variable.into(),
+                counters.clone().into(),
+                candidates.clone().into(),
+                noted.clone().into(),
             ];
             let own = self.passes.extract.group.get(device, &own);
             let groups = [Some(&own), Some(&scene.triangles)];
             let edges = workgroups(tables.edge_count);
             self.passes.extract.pass.record(recorder, "prepare.silhouette", &groups, edges);
+            if let Some(find_sides) = &mut self.passes.find_sides {
+                let sides = self.sides.get(device, side_bytes(&tables))?;
+                let own = [
+                    settings,
+                    tables.edges.clone().into(),
+                    noted.into(),
+                    counters.into(),
+                    candidates.into(),
+                    sides.into(),
+                ];
+                let own = find_sides.group.get(device, &own);
+                find_sides.pass.record(recorder, "prepare.sides", &[Some(&own)], edges);
+            }
         }
         let cutouts = scene.cutouts.clone().unwrap_or_else(|| {
             let none: Bound = self.no_masks.get(device, &[]).into();
@@ -229,22 +258,27 @@ impl PenumbraWedgesOnGpu {
         let counters: Bound = self.counters.get(device, 4 * COUNTERS)?.into();
         let candidates: Bound = self.candidates.get(device, candidate_bytes(tables))?.into();
         let facing: Bound = self.facing.get(device, 4 * u64::from(tables.triangles))?.into();
-        let variable: Bound = self.variable.get(device, variable_bytes(tables))?.into();
+        // What a variant keeps for an edge besides.
+        let of_edges: Option<Bound> = match self.params.variant {
+            Variant::Exact => Some(self.variable.get(device, variable_bytes(tables))?.into()),
+            Variant::Interpolated => Some(self.sides.get(device, side_bytes(tables))?.into()),
+            Variant::Coverage => None,
+        };
         let (nodes, leaves): (Bound, Bound) = (tables.nodes.clone().into(), tables.leaves.clone().into());
         let (triangles, receivers) = (Some(&scene.triangles), Some(&receivers));
         let cutouts = Some(&prepared.cutouts);
         let passes = &mut self.passes;
 
-        let own = [settings.clone(), candidates.clone(), counters.clone(), lists.clone()];
-        let own = passes.list_edges.group.get(device, &own);
+        let exact = self.params.variant == Variant::Exact;
+        let shared = [settings.clone(), candidates, counters, lists];
+        let own = if exact { &[][..] } else { of_edges.as_slice() };
+        let own = passes.list_edges.group.get(device, &[&shared[..], own].concat());
         let groups = [Some(&own), triangles, None, receivers];
         passes.list_edges.pass.record(recorder, "shade.blocks", &groups, [columns, rows, 1]);
 
         let [columns, rows] = tiles(camera, TILE);
-        let exact = self.params.variant == Variant::Exact;
-        let shared = [settings.clone(), candidates, counters, lists];
-        let own = if exact { vec![variable, pixels.clone()] } else { vec![pixels.clone()] };
-        let own = passes.count.group.get(device, &[&shared[..], &own].concat());
+        let own = [&shared[..], of_edges.as_slice(), std::slice::from_ref(&pixels)].concat();
+        let own = passes.count.group.get(device, &own);
         let groups = [Some(&own), triangles, None, receivers];
         passes.count.pass.record(recorder, "shade.wedges", &groups, [columns, rows, 1]);
 
@@ -266,8 +300,16 @@ impl PenumbraWedgesOnGpu {
     }
 
     fn bytes(&self) -> u64 {
-        let work =
-            [&self.facing, &self.counters, &self.candidates, &self.variable, &self.pixels, &self.lists];
+        let work = [
+            &self.facing,
+            &self.counters,
+            &self.candidates,
+            &self.variable,
+            &self.corners,
+            &self.sides,
+            &self.pixels,
+            &self.lists,
+        ];
         work.into_iter().map(WorkBuffer::bytes).sum::<u64>() + self.tables.as_ref().map_or(0, Tables::bytes)
     }
 
@@ -302,6 +344,11 @@ fn candidate_bytes(tables: &Tables) -> u64 {
 /// Room for all faces of all edges, and their numbers.
 fn variable_bytes(tables: &Tables) -> u64 {
     4 * (u64::from(tables.incident_count) + u64::from(tables.edge_count))
+}
+
+/// Room for the side planes of all edges.
+fn side_bytes(tables: &Tables) -> u64 {
+    48 * u64::from(tables.edge_count.max(1))
 }
 
 fn new_tables(device: &wgpu::Device, query: &GpuShadowQuery<'_>) -> Result<Tables, TechniqueError> {

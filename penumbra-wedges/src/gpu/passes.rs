@@ -19,6 +19,8 @@ pub(super) struct Pass {
 pub(super) struct Passes {
     pub(super) find_facing: Pass,
     pub(super) extract: Pass,
+    /// Of `interpolated`.
+    pub(super) find_sides: Option<Pass>,
     pub(super) list_edges: Pass,
     pub(super) count: Pass,
     pub(super) ask: Pass,
@@ -30,6 +32,7 @@ pub(super) struct Passes {
 /// Which of groups 1 to 3 a pass binds.
 #[derive(Clone, Copy)]
 enum Binds {
+    Nothing,
     Triangles,
     TrianglesAndReceivers,
     All,
@@ -52,6 +55,7 @@ impl Passes {
         let compute = |label, wgsl, entry, binds, own: &HeldGroup| {
             let (triangles, cutouts) = (Some(&scene.triangles_layout), Some(&scene.cutouts_layout));
             let groups = match binds {
+                Binds::Nothing => vec![Some(own.layout())],
                 Binds::Triangles => vec![Some(own.layout()), triangles],
                 Binds::TrianglesAndReceivers => {
                     vec![Some(own.layout()), triangles, None, Some(receivers.layout())]
@@ -65,18 +69,55 @@ impl Passes {
             Pass { pass: compute(label, wgsl, entry, binds, &group), group }
         };
         let lit = Binds::TrianglesAndReceivers;
-        let sides = if variant == Variant::Exact { "find_sides" } else { "find_layers" };
         let exact = variant == Variant::Exact;
+        let sides = if exact { "find_sides" } else { "find_layers" };
         let trace = pass("wedges traced", shaders::RAYS, "trace", Binds::All, &[READ, READ, WRITE]);
         let ask = if exact {
             pass("wedges rays", shaders::RAYS, "ask", Binds::All, &[READ, READ, WRITE])
         } else {
             pass("wedges layers", shaders::LAYERS, "add_layers", lit, &[READ, READ, READ, WRITE])
         };
-        let count = if exact {
-            pass("wedges exact", shaders::EXACT, "count", lit, &[READ, READ, READ, READ, WRITE])
+        let count = match variant {
+            Variant::Exact => {
+                pass("wedges exact", shaders::EXACT, "count", lit, &[READ, READ, READ, READ, WRITE])
+            }
+            Variant::Coverage => {
+                pass("wedges coverage", shaders::COVERAGE, "add", lit, &[READ, READ, READ, WRITE])
+            }
+            Variant::Interpolated => pass(
+                "wedges interpolated",
+                shaders::INTERPOLATED,
+                "add",
+                lit,
+                &[READ, READ, READ, READ, WRITE],
+            ),
+        };
+        let extract = [READ, READ, READ, WRITE, WRITE, WRITE];
+        let (extract, find_sides, list_edges) = if variant == Variant::Interpolated {
+            let (outline, sides) = (shaders::OUTLINE, shaders::SIDES);
+            (
+                pass("wedges outline", outline, "extract_outline", Binds::Triangles, &extract),
+                Some(pass(
+                    "wedges sides",
+                    sides,
+                    "find_side_planes",
+                    Binds::Nothing,
+                    &[READ, READ, READ, READ, WRITE],
+                )),
+                pass("wedges blocks", shaders::WEDGE_BLOCKS, "list_wedges", lit, &[READ, READ, WRITE, READ]),
+            )
         } else {
-            pass("wedges coverage", shaders::COVERAGE, "add", lit, &[READ, READ, READ, WRITE])
+            (
+                pass(
+                    "wedges silhouette",
+                    shaders::SILHOUETTE,
+                    "extract_silhouette",
+                    Binds::Triangles,
+                    &extract,
+                ),
+                None,
+                pass("wedges blocks", shaders::BLOCKS, "list_edges", lit, &[READ, READ, WRITE]),
+            )
         };
         let write_group = group("wedges write", &[READ]);
         let write = VisibilityPass::new(
@@ -91,7 +132,6 @@ impl Passes {
                 format: visibility,
             },
         );
-        let extract = [READ, READ, READ, WRITE, WRITE, WRITE];
         Self {
             find_facing: pass(
                 "wedges facing",
@@ -100,14 +140,9 @@ impl Passes {
                 Binds::Triangles,
                 &[READ, WRITE, WRITE],
             ),
-            extract: pass(
-                "wedges silhouette",
-                shaders::SILHOUETTE,
-                "extract_silhouette",
-                Binds::Triangles,
-                &extract,
-            ),
-            list_edges: pass("wedges blocks", shaders::BLOCKS, "list_edges", lit, &[READ, READ, WRITE]),
+            extract,
+            find_sides,
+            list_edges,
             count,
             ask,
             trace,

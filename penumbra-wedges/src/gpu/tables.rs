@@ -40,6 +40,8 @@ pub struct Tables {
     pub incident_count: u32,
     /// Triangles of the scene.
     pub triangles: u32,
+    /// Vertices of the scene.
+    pub vertices: u32,
     /// Nodes of solid casters.
     pub solid_nodes: u32,
     /// Nodes in all.
@@ -81,6 +83,7 @@ impl Tables {
             edge_count: edges.len() as u32,
             incident_count: incident.len() as u32,
             triangles: triangles as u32,
+            vertices: geometry.positions().len() as u32,
             solid_nodes: trees.solid,
             all_nodes: trees.nodes.len() as u32,
             masked: casters.masked().map(|object| object.name.clone()),
