@@ -49,7 +49,7 @@ impl DepthPyramid {
     }
 
     /// The nearest depth in the texels `first` to `last` (column and row, inclusive) of `map`, or of a few beside
-    /// them: never farther than the true one. Both must lie inside the map.
+    /// them: never farther than the true one. Both must lie inside the map; rows that are not held are empty.
     #[inline]
     pub fn nearest(&self, map: &DepthMap, first: [usize; 2], last: [usize; 2]) -> f32 {
         // From this level on the rectangle touches two texels a side at most.
@@ -61,7 +61,7 @@ impl DepthPyramid {
         };
         let [x0, y0] = first.map(|at| at >> level);
         let [x1, y1] = last.map(|at| at >> level);
-        let at = |x: usize, y: usize| depth[y * width + x];
+        let at = |x: usize, y: usize| depth.get(y * width + x).copied().unwrap_or(0.0);
         at(x0, y0).max(at(x1, y0)).max(at(x0, y1)).max(at(x1, y1))
     }
 

@@ -3,6 +3,7 @@
 pub mod alias_free;
 mod cascaded;
 pub mod cascades;
+mod cone_reach;
 pub mod cpu;
 pub mod depth_pyramid;
 pub mod filter_maps;
@@ -29,11 +30,13 @@ mod technique;
 pub mod texel_outcomes;
 pub mod texel_plane;
 pub mod view_casters;
+mod view_needs;
 
+use std::cell::OnceCell;
 use std::fmt::Debug;
 
 use glam::Vec3;
-use scene_core::relevance::{self, Backdrops, CasterChunks, Receivers};
+use scene_core::relevance::{Backdrops, CasterChunks, Receivers};
 use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
 
 use cascaded::Cascaded;
@@ -48,6 +51,7 @@ use pcf::Pcf;
 use pcss::Pcss;
 pub use technique::Factory;
 use view_casters::ViewNeeds;
+use view_needs::{Reach, Seen};
 
 /// The technique: settings, from which any number of lights can be prepared.
 #[derive(Clone, Copy, Debug, Default)]
@@ -102,29 +106,13 @@ impl ShadowMap {
         chunks: &CasterChunks,
     ) -> (PreparedShadowMap<'a>, Report) {
         self.prepare_with(scene, light, |casters, views, report| {
-            let reach = self.params.reach_texels().filter(|_| self.params.skip)?;
+            let reach = Reach::of(&self.params, light).filter(|_| self.params.skip)?;
             report.time("prepare.relevance", |report| {
                 let map_size = self.params.map_size;
                 let receivers = Receivers::seen_closely_by(scene, camera, light);
-                let of = |view: &LightView| {
-                    let seen = if views.len() > 1 {
-                        let sides = view_casters::looked_up_in(view, map_size, reach)?;
-                        receivers.clone().inside(&sides)
-                    } else {
-                        receivers.clone()
-                    };
-                    let region =
-                        view_casters::looked_up_behind(scene, light, &seen, &[*view], map_size, reach);
-                    let casters = relevance::relevant_casters(scene, &region, chunks, |id| {
-                        let object = &scene.objects()[id as usize];
-                        !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
-                    });
-                    // A filter that goes on into this face from that beside it is there by up to its reach more to the side.
-                    let reach = if views.len() > 1 { 3.0 * reach } else { reach };
-                    let window = view_casters::looked_up_texels(view, &seen, map_size, reach);
-                    Some(ViewNeeds { casters, window })
-                };
-                let kept = views.iter().map(of).collect::<Option<Vec<_>>>()?;
+                let seen = Seen { scene, light, receivers, casters, chunks, map_size, sine: OnceCell::new() };
+                let needs = views.iter().map(|view| seen.needs(view, views.len() > 1, reach));
+                let kept = needs.collect::<Option<Vec<_>>>()?;
                 kept.iter().for_each(|kept| kept.book(report, map_size));
                 Some(kept)
             })

@@ -50,6 +50,14 @@ impl ShadowMapView {
         Self { view, map, triangles: vec![0; texels], window }
     }
 
+    /// Whether a texel is one of those that are looked up.
+    #[inline]
+    pub(crate) fn holds(&self, column: usize, row: usize) -> bool {
+        let [columns, rows] = &self.window;
+        (columns.start as usize..columns.end as usize).contains(&column)
+            && (rows.start as usize..rows.end as usize).contains(&row)
+    }
+
     /// Normalised device coordinates in texels: column and row, a texel's centre at one half; beside the map, too.
     #[inline]
     pub(crate) fn texel_at(&self, ndc: Vec2) -> Vec2 {
@@ -195,7 +203,8 @@ impl<'a> LightMaps<'a> {
         let (map, ndc) = self.maps.iter().find_map(|m| m.view.project(receiver).map(|ndc| (m, ndc)))?;
         let (size, count) = (map.map.width as f32, map.map.width as usize);
         let [column, row] = map.texel(ndc);
-        let depth = map.map.depth[row * count + column];
+        // For one view only a part is drawn.
+        let depth = if map.holds(column, row) { map.map.depth[row * count + column] } else { 0.0 };
         let center = Vec2::new(column as f32 + 0.5, row as f32 + 0.5) * (2.0 / size);
         (depth > 0.0).then(|| Occluder {
             point: map.view.unproject(Vec2::new(center.x - 1.0, 1.0 - center.y), depth),
@@ -215,7 +224,7 @@ impl<'a> LightMaps<'a> {
             around(row).any(|row| {
                 around(column).any(|column| {
                     let texel = row * (last + 1) + column;
-                    map.map.depth[texel] > 0.0 && {
+                    map.holds(column, row) && map.map.depth[texel] > 0.0 && {
                         let corners = self.scene.corners(map.triangles[texel] as usize);
                         is_behind(corners, receiver, light, tolerance) && meets(corners, receiver, light)
                     }

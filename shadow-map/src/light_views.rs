@@ -10,6 +10,8 @@ use scene_core::light::LightPoint;
 use scene_core::relevance::HalfSpace;
 use scene_core::{Light, Scene};
 
+use crate::light_maps::Window;
+
 /// Tangent of the half angle up to which one perspective view serves. Beyond 60° the middle of the map gets
 /// less than a quarter of the texels a radian that its rim gets, and cube faces are the better use of memory.
 const MAX_TAN: f32 = 1.732;
@@ -145,10 +147,24 @@ impl LightView {
 
     /// The four sides of what the map holds, `times` as wide from its middle, moved outwards by `distance`.
     pub(crate) fn sides(&self, times: f64, distance: f64) -> Vec<HalfSpace> {
+        self.sides_at([times; 4], distance)
+    }
+
+    /// The four sides of some texels of a map of `map_size` a side, and of one more all around for the rasteriser's snapping.
+    pub(crate) fn sides_of(&self, window: &Window, map_size: u32) -> Vec<HalfSpace> {
+        let texel = 2.0 / f64::from(map_size.max(1));
+        let [columns, rows] =
+            window.clone().map(|side| [f64::from(side.start) - 1.0, f64::from(side.end) + 1.0]);
+        let [left, right] = columns.map(|column| column * texel - 1.0);
+        let [top, bottom] = rows.map(|row| 1.0 - row * texel);
+        self.sides_at([right, -left, top, -bottom], 0.0)
+    }
+
+    /// Half-spaces x ≤ a·w, −x ≤ b·w, y ≤ c·w and −y ≤ d·w, moved outwards by `distance`.
+    fn sides_at(&self, ends: [f64; 4], distance: f64) -> Vec<HalfSpace> {
         let rows = self.projection_from_world.as_dmat4().transpose();
-        // |x| ≤ w and |y| ≤ w.
-        let sides =
-            [rows.x_axis, -rows.x_axis, rows.y_axis, -rows.y_axis].map(|row| row - rows.w_axis * times);
+        let axes = [rows.x_axis, -rows.x_axis, rows.y_axis, -rows.y_axis];
+        let sides = [0, 1, 2, 3].map(|side| axes[side] - rows.w_axis * ends[side]);
         let plane = |side: DVec4| {
             let length = side.truncate().length();
             HalfSpace { normal: side.truncate() / length, offset: distance - side.w / length }

@@ -52,10 +52,14 @@ pub(crate) struct Moments<'a> {
     light_bleeding: f32,
 }
 
-/// The moments of one view, with a border of one texel for lookups between texels.
+/// The moments of one view's texels that are looked up, with a border of one for lookups between texels.
 #[derive(Clone, Debug)]
 struct MomentMap {
+    /// Texels a side of the whole map, and two.
     side: usize,
+    /// Column and row, counted from the border's, of the first that is kept.
+    first: [usize; 2],
+    columns: usize,
     moments: Vec<Window>,
     depths: DepthScale,
 }
@@ -131,37 +135,43 @@ impl MomentMap {
     fn new(maps: &LightMaps<'_>, view: usize, window: usize) -> Self {
         let map = &maps.maps[view];
         let depths = DepthScale::new(&map.view);
-        let size = map.map.width as usize;
         // An even window has half a texel at both ends.
         let half = window / 2;
         let weight =
             |step: usize| if window.is_multiple_of(2) && (step == 0 || step == 2 * half) { 0.5 } else { 1.0 };
-        let (border, side) = (half + 1, size + 2);
-        let wide = size + 2 * border;
-        let at = |index: usize| index as i32 - border as i32;
-        let mut scaled = vec![1.0f32; wide * wide];
-        scaled.par_chunks_mut(wide).enumerate().for_each(|(row, line)| {
+        let border = half + 1;
+        let first = map.window.clone().map(|side| side.start as usize);
+        // Nothing is looked up in a face that nobody sees.
+        let is_empty = map.window.iter().any(|side| side.is_empty());
+        let [columns, rows] =
+            map.window.clone().map(|side| if is_empty { 0 } else { (side.end - side.start) as usize + 2 });
+        let [wide, high] = [columns, rows].map(|count| if is_empty { 0 } else { count + 2 * half });
+        let at = |axis: usize, index: usize| (first[axis] + index) as i32 - border as i32;
+        let mut scaled = vec![1.0f32; wide * high];
+        scaled.par_chunks_mut(wide.max(1)).enumerate().for_each(|(row, line)| {
             for (column, value) in line.iter_mut().enumerate() {
-                *value = depth_at(maps, view, depths, at(column), at(row));
+                *value = depth_at(maps, view, depths, at(0, column), at(1, row));
             }
         });
         let share = 1.0 / window as f32;
         // Along rows, then along columns.
-        let mut lines = vec![Window::default(); side * wide];
-        lines.par_chunks_mut(side).zip(scaled.par_chunks(wide)).for_each(|(line, scaled)| {
+        let mut lines = vec![Window::default(); columns * high];
+        lines.par_chunks_mut(columns.max(1)).zip(scaled.par_chunks(wide.max(1))).for_each(
+            |(line, scaled)| {
+                for (column, joined) in line.iter_mut().enumerate() {
+                    let depth = |step: usize| Window::of(scaled[column + step]);
+                    *joined = Window::joined((0..=2 * half).map(|step| (weight(step) * share, depth(step))));
+                }
+            },
+        );
+        let mut moments = vec![Window::default(); columns * rows];
+        moments.par_chunks_mut(columns.max(1)).enumerate().for_each(|(row, line)| {
             for (column, joined) in line.iter_mut().enumerate() {
-                let depth = |step: usize| Window::of(scaled[column + step]);
-                *joined = Window::joined((0..=2 * half).map(|step| (weight(step) * share, depth(step))));
-            }
-        });
-        let mut moments = vec![Window::default(); side * side];
-        moments.par_chunks_mut(side).enumerate().for_each(|(row, line)| {
-            for (column, joined) in line.iter_mut().enumerate() {
-                let window = |step: usize| lines[(row + step) * side + column];
+                let window = |step: usize| lines[(row + step) * columns + column];
                 *joined = Window::joined((0..=2 * half).map(|step| (weight(step) * share, window(step))));
             }
         });
-        Self { side, moments, depths }
+        Self { side: map.map.width as usize + 2, first, columns, moments, depths }
     }
 
     /// Moments at a place in texels, 0 at the centre of the first, linear between centres.
@@ -171,14 +181,19 @@ impl MomentMap {
         let first = at.floor().min(Vec2::splat(self.side as f32 - 2.0));
         let b = at - first;
         let a = 1.0 - b;
-        let index = first.y as usize * self.side + first.x as usize;
-        let window = |beside: usize| self.moments[index + beside];
+        let [column, row] = [first.x as usize, first.y as usize];
+        // Who is not seen may ask for what is not kept.
+        let window = |column: usize, row: usize| {
+            let [column, row] = [column.wrapping_sub(self.first[0]), row.wrapping_sub(self.first[1])];
+            let line = self.moments.chunks(self.columns.max(1)).nth(row);
+            line.and_then(|line| line.get(column)).copied().unwrap_or(Window::of(1.0))
+        };
         Window::joined(
             [
-                (a.x * a.y, window(0)),
-                (b.x * a.y, window(1)),
-                (a.x * b.y, window(self.side)),
-                (b.x * b.y, window(self.side + 1)),
+                (a.x * a.y, window(column, row)),
+                (b.x * a.y, window(column + 1, row)),
+                (a.x * b.y, window(column, row + 1)),
+                (b.x * b.y, window(column + 1, row + 1)),
             ]
             .into_iter(),
         )
@@ -253,7 +268,9 @@ fn depth_at(maps: &LightMaps<'_>, view: usize, depths: DepthScale, column: i32, 
     let map = &maps.maps[view];
     let size = map.map.width as i32;
     if (0..size).contains(&column) && (0..size).contains(&row) {
-        return depths.scaled(map.map.depth[row as usize * size as usize + column as usize]);
+        let (column, row) = (column as usize, row as usize);
+        let is_held = map.holds(column, row);
+        return if is_held { depths.scaled(map.map.depth[row * size as usize + column]) } else { 1.0 };
     }
     if maps.maps.len() < 2 {
         return 1.0;

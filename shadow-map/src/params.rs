@@ -143,17 +143,6 @@ impl ShadowMapParams {
         self.skip
             && !matches!(self.variant, Variant::Pcf | Variant::ObjectId | Variant::Pcss | Variant::Moments)
     }
-
-    /// How many texels beside a receiver's own its lookup reads at most; `None` if that depends on more than the
-    /// settings.
-    pub(crate) fn reach_texels(&self) -> Option<f64> {
-        match self.variant {
-            Variant::Hard => Some(HARD_REACH),
-            Variant::Pcss | Variant::Moments => None,
-            Variant::Cascaded | Variant::MultiView | Variant::AliasFree => None,
-            Variant::Pcf | Variant::ObjectId => Some(f64::from(self.filter) * 0.5 + 2.0),
-        }
-    }
 }
 
 impl Default for ShadowMapParams {

@@ -2,7 +2,8 @@
 //! off at the nearest surface stored in it.
 //!
 //! Of the cone only what is farther from the light than its nearest blocker matters. So the rectangle of texels
-//! around the cone up to the nearest surface of the whole map is found first; the nearest surface of that rectangle
+//! around the cone up to the nearest surface of the whole map is found first (of a sun's map, fitted to its casters, up to its
+//! nearest depth); the nearest surface of that rectangle
 //! cuts the cone again, and so on. Each rectangle holds every blocker; most are a few texels wide after two steps.
 
 use glam::{Mat4, Vec4};
@@ -111,7 +112,9 @@ impl ClipCone {
 pub fn search_region(taps: &Taps<'_>, clip: &ClipCone) -> SearchRegion {
     let end = taps.map().map.width as i32 - 1;
     let (mut first, mut last) = ([0; 2], [end; 2]);
-    let mut nearest = taps.nearest(first, last).unwrap_or(0.0);
+    // No depth of a sun's map is beyond 1. Others are cut by what is stored.
+    let of_all = || taps.nearest(first, last).unwrap_or(0.0);
+    let mut nearest = if clip.is_parallel { 1.0 } else { of_all() };
     // Without a depth in the face itself there is nothing to cut the cone with.
     if nearest <= 0.0 {
         return if taps.is_lone() { SearchRegion::Clear } else { SearchRegion::Unbounded };

@@ -133,6 +133,9 @@ impl<'m> Taps<'m> {
         let map = self.map();
         let size = map.map.width as i32;
         if (0..size).contains(&column) && (0..size).contains(&row) {
+            if !map.holds(column as usize, row as usize) {
+                return None;
+            }
             let index = row as usize * size as usize + column as usize;
             let depth = map.map.depth[index];
             let rises = depth > 0.0 && self.plane.rise(column as f32, row as f32, depth) > 0.0;
@@ -165,6 +168,9 @@ impl<'m> Taps<'m> {
         let size = map.map.width;
         let at = Vec2::new(ndc.x * 0.5 + 0.5, 0.5 - ndc.y * 0.5) * size as f32;
         let (column, row) = ((at.x as u32).min(size - 1), (at.y as u32).min(size - 1));
+        if !map.holds(column as usize, row as usize) {
+            return None;
+        }
         let index = row as usize * size as usize + column as usize;
         let depth = map.map.depth[index];
         let plane =

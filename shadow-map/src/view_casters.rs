@@ -5,6 +5,7 @@
 //! one farther off would be stored and asked in its place. So each texel that is looked up holds the same
 //! triangle as in a map of all casters, and no pixel changes.
 
+use glam::DVec3;
 use scene_core::light::LightPoint;
 use scene_core::relevance::{CasterRegion, HalfSpace, Receivers, RelevantCasters};
 use scene_core::{Light, Report, Scene};
@@ -67,8 +68,17 @@ pub fn looked_up_in(view: &LightView, map_size: u32, reach: f64) -> Option<Vec<H
 /// The columns and rows of `view`'s map that lookups for `receivers` read, up to `reach` texels from their own. All of them
 /// where part of the receivers may lie behind the view. Two texels more are for that of the receiver and for rounding.
 pub fn looked_up_texels(view: &LightView, receivers: &Receivers, map_size: u32, reach: f64) -> Window {
-    let Some(TexelBounds { min, max, error }) = view.texel_bounds(map_size, receivers.region().vertices())
-    else {
+    window_within(view, receivers.region().vertices(), map_size, reach)
+}
+
+/// [`looked_up_texels`] for the hull of `points`.
+pub(crate) fn window_within(
+    view: &LightView,
+    points: impl IntoIterator<Item = DVec3>,
+    map_size: u32,
+    reach: f64,
+) -> Window {
+    let Some(TexelBounds { min, max, error }) = view.texel_bounds(map_size, points) else {
         return [0..map_size, 0..map_size];
     };
     let reach = reach + error;
