@@ -35,7 +35,14 @@ fn peak_since_last_call() -> Option<f64> {
     Some(kib / 1024.0)
 }
 
-fn row(name: &str, mut setup: SceneSetup, views: u32, size: u32, segments: Segments, paper: Option<&Paper>) {
+fn row(
+    name: &str,
+    mut setup: SceneSetup,
+    [views, size]: [u32; 2],
+    segments: Segments,
+    paper: Option<&Paper>,
+    one: &rayon::ThreadPool,
+) {
     (setup.camera.width, setup.camera.height) = (512, 512);
     let (scene, light) = (&setup.scene, &setup.lights[0]);
     let params = PdsmParams {
@@ -62,6 +69,13 @@ fn row(name: &str, mut setup: SceneSetup, views: u32, size: u32, segments: Segme
         pdsm.shade(&gbuffer, &mut image);
         lookup = lookup.min(start.elapsed().as_secs_f64() * 1e3);
     }
+    let seen = (0..gbuffer.pixel_count()).filter(|&pixel| gbuffer.is_seen(pixel)).count();
+    let mut alone = f64::INFINITY;
+    for _ in 0..5 {
+        let start = Instant::now();
+        one.install(|| pdsm.shade(&gbuffer, &mut image));
+        alone = alone.min(start.elapsed().as_secs_f64() * 1e9 / seen.max(1) as f64);
+    }
     let pixels = f64::from(size) * f64::from(size) * pdsm.windows().len().max(1) as f64;
     let sum =
         |of: fn(&Functions) -> u64| pdsm.windows().iter().map(|window| of(&window.functions)).sum::<u64>();
@@ -70,7 +84,7 @@ fn row(name: &str, mut setup: SceneSetup, views: u32, size: u32, segments: Segme
     };
     let none = || "–".to_owned();
     println!(
-        "| {name}, {segments:?} | {} | {views} | {size}² | {seconds:.3} s | {} | {:.1} / {:.1} | {} / {} | {} | {:.1} | {} | {lookup:.1} ms | {} |",
+        "| {name}, {segments:?} | {} | {views} | {size}² | {seconds:.3} s | {} | {:.1} / {:.1} | {} / {} | {} | {:.1} | {} | {lookup:.1} ms | {} | {alone:.0} |",
         scene.triangles().len(),
         paper.map_or_else(none, |p| format!("{:.0} s, {:.0}×", p.seconds, p.seconds / seconds)),
         sum(|f| f.statistics().events) as f64 / pixels,
@@ -86,14 +100,15 @@ fn row(name: &str, mut setup: SceneSetup, views: u32, size: u32, segments: Segme
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!(
-        "| scene | triangles | maps | of | construction | the paper's | events a ray, all / kept | most | the paper's | MiB | peak MiB | shading 512² | the paper's frame |"
+        "| scene | triangles | maps | of | construction | the paper's | events a ray, all / kept | most | the paper's | MiB | peak MiB | shading 512² | the paper's frame | lookup, ns a pixel, one thread |"
     );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let arguments: Vec<_> = std::env::args().skip(1).collect();
     if arguments.is_empty() {
         for (name, views, size, paper) in &ROWS {
             for segments in [Segments::Greedy, Segments::Fewest] {
-                row(name, scenes::build(name, 0.0)?, *views, *size, segments, Some(paper));
+                row(name, scenes::build(name, 0.0)?, [*views, *size], segments, Some(paper), &one);
             }
         }
     }
@@ -103,7 +118,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         } else {
             scenes::build(argument, 0.0)?
         };
-        row(argument, setup, 64, 512, Segments::Fewest, None);
+        row(argument, setup, [64, 512], Segments::Fewest, None, &one);
     }
     Ok(())
 }

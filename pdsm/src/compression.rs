@@ -154,11 +154,12 @@ impl Compressor {
             if after == before {
                 continue;
             }
-            for shadowed in [before, after] {
+            let sides = [before, after].map(|shadowed| {
                 let (visibility, bound) = self.levels[shadowed as usize];
                 self.is_needed |= 1.0 - visibility > bound;
-                line.visit(Node { t: t as f32, visibility: visibility as f32 }, bound as f32);
-            }
+                [visibility as f32, bound as f32]
+            });
+            line.visit_step(t as f32, sides);
             before = after;
         }
         line.end();

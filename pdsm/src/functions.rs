@@ -1,6 +1,7 @@
 //! Where the visibility functions of all PDSM pixels are kept: an index and a data array (section 4.1, figure 6), laid
 //! out alike in memory, on the GPU and in files.
 
+use bytemuck::Zeroable;
 use rayon::prelude::*;
 
 use crate::compression::{Compression, Compressor};
@@ -84,19 +85,27 @@ impl Functions {
             .collect();
         let mut functions = Self { size, ..Self::default() };
         functions.index.reserve(size as usize * size as usize + 1);
-        let mut nodes = Vec::with_capacity(strips.iter().map(|strip| strip.nodes.len()).sum());
         let mut start = 0;
         for strip in &strips {
             for count in &strip.counts {
                 functions.index.push(start);
                 start += count;
             }
-            nodes.extend_from_slice(&strip.nodes);
             let statistics = &mut functions.statistics;
             statistics.events += strip.statistics.events;
             statistics.most_events = statistics.most_events.max(strip.statistics.most_events);
             statistics.most_nodes = statistics.most_nodes.max(strip.statistics.most_nodes);
         }
+        // Each strip to its place by itself: fresh memory costs most of the copying.
+        let mut nodes = vec![Node::zeroed(); start as usize];
+        let mut rest = nodes.as_mut_slice();
+        let mut places = Vec::with_capacity(strips.len());
+        for strip in &strips {
+            let (place, after) = rest.split_at_mut(strip.nodes.len());
+            places.push(place);
+            rest = after;
+        }
+        places.into_par_iter().zip(&strips).for_each(|(place, strip)| place.copy_from_slice(&strip.nodes));
         functions.index.push(start);
         functions.nodes = Nodes::Full(nodes);
         functions

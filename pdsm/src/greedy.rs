@@ -31,13 +31,34 @@ impl<'a> Greedy<'a> {
     /// Carries the line on to a point of the function, past which it may be off by `bound`; where none can pass, ends it
     /// and begins another.
     #[inline]
-    pub(crate) fn visit(&mut self, point: Node, bound: f32) {
+    fn visit(&mut self, point: Node, bound: f32) {
         if self.try_visit(point, bound) {
             return;
         }
         self.end();
         if !self.try_visit(point, bound) {
             self.begin(point);
+        }
+    }
+
+    /// Visits both sides of a step, each value of V with its bound. Mostly the line passes both, which one look tells: slopes
+    /// divide by the same run, and of two quotients the larger is that of the larger number, rounded as it is.
+    #[inline]
+    pub(crate) fn visit_step(&mut self, t: f32, sides: [[f32; 2]; 2]) {
+        let run = t - self.origin.t;
+        if run > 0.0 {
+            let rises = sides.map(|[visibility, _]| visibility - self.origin.visibility);
+            let least = (rises[0] - sides[0][1]).max(rises[1] - sides[1][1]);
+            let most = (rises[0] + sides[0][1]).min(rises[1] + sides[1][1]);
+            let low = self.slopes[0].max(least / run);
+            let high = self.slopes[1].min(most / run);
+            if low <= high {
+                (self.slopes, self.last) = ([low, high], t);
+                return;
+            }
+        }
+        for [visibility, bound] in sides {
+            self.visit(Node { t, visibility }, bound);
         }
     }
 
