@@ -11,7 +11,7 @@ use scene_core::{SceneSetup, io, scenes};
 
 type Failure = Box<dyn std::error::Error>;
 
-const SIZE: (u32, u32) = (760, 570);
+const SIZE: (u32, u32) = (1120, 840);
 const COLOURS: [RGBColor; 5] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -61,10 +61,10 @@ where
     let points = || curves.iter().flat_map(|(_, points)| points);
     let most = |of: fn(&(f64, f64)) -> f64| points().map(of).fold(0.0, f64::max) * 1.05;
     let mut chart = ChartBuilder::on(area)
-        .margin(8)
-        .caption(title, ("sans-serif", 16))
-        .x_label_area_size(34)
-        .y_label_area_size(48)
+        .margin(12)
+        .caption(title, ("sans-serif", 20))
+        .x_label_area_size(42)
+        .y_label_area_size(62)
         .build_cartesian_2d(0.0..most(|p| p.0), 0.0..most(|p| p.1))?;
     chart
         .configure_mesh()
@@ -72,8 +72,8 @@ where
         .y_desc(y)
         .light_line_style(WHITE)
         .bold_line_style(RGBColor(225, 225, 225))
-        .label_style(("sans-serif", 12))
-        .axis_desc_style(("sans-serif", 13))
+        .label_style(("sans-serif", 14))
+        .axis_desc_style(("sans-serif", 15))
         .draw()?;
     for ((name, points), colour) in curves.iter().zip(COLOURS) {
         chart
@@ -86,7 +86,7 @@ where
         .configure_series_labels()
         .position(SeriesLabelPosition::UpperLeft)
         .background_style(WHITE.mix(0.8))
-        .label_font(("sans-serif", 12))
+        .label_font(("sans-serif", 14))
         .draw()?;
     Ok(())
 }
