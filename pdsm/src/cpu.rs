@@ -131,7 +131,7 @@ fn shade_row<S: Simd>(_simd: S, lookup: &Lookup<'_>, gbuffer: &GBuffer, first: u
 /// Free points that a task looks up.
 const POINTS: usize = 1024;
 
-/// `shade.lookup` of free points: see [`Lookup::free_points`].
+/// `shade.lookup` of free points: V, NaN at what is no point.
 pub fn free_points(lookup: &Lookup<'_>, points: &[Vec3], visibility: &mut [f32]) {
     let level = Level::new();
     visibility.par_chunks_mut(POINTS).zip(points.par_chunks(POINTS)).for_each(|(values, points)| {
