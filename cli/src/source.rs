@@ -23,7 +23,7 @@ static SETTINGS: LazyLock<Vec<Setting>> = LazyLock::new(|| {
         name: "source",
         kind: SettingKind::Choice(&NAMES),
         unit: "",
-        doc: "whose hard shadows are blurred: exact ones of directional lights and else the own map's, always those, \
+        doc: "whose hard shadows are blurred: exact ones with physical scaling and else the own map's, always those, \
               or another technique's of the same map_size",
     };
     ContactHardeningParams::SETTINGS.iter().copied().chain([source]).collect()

@@ -42,7 +42,8 @@ pub fn to_light(center: LightPoint, point: Vec3) -> Vec3 {
 /// `shade.distance`, pass 2: S from `hard` where there is one, V of some technique, or else from the maps; D from the
 /// maps. Writes the V that is known without a shadow to `visibility`.
 ///
-/// V below one half counts as shadowed. A pixel that `hard` shadows and no map does has D = 0: it stays as it is.
+/// V below one half counts as shadowed. A pixel that `hard` shadows and no map does has D = 0: what its texel holds is not what
+/// hides the light, but a surface beside the blocker or the receiver's own.
 pub fn distance_map(
     maps: &LightMaps<'_>,
     gbuffer: &GBuffer,
@@ -60,17 +61,17 @@ pub fn distance_map(
             let receiver = match receiver(maps, gbuffer, pixel) {
                 Ok(receiver) => receiver,
                 Err(known) => {
-                    values[column] = known;
+                    // Whether a spot's cone reaches a pixel on its border is the source's matter, too.
+                    values[column] = hard.map_or(known, |hard| hard.values[pixel]);
                     continue;
                 }
             };
-            let is_shadowed = match hard {
-                Some(hard) => hard.values[pixel] < 0.5,
-                None => maps.hard(&receiver) < 0.5,
-            };
+            let by_map = || maps.hard(&receiver) < 0.5;
+            let is_shadowed = hard.map_or_else(by_map, |hard| hard.values[pixel] < 0.5);
             shadow[column] = f32::from(u8::from(is_shadowed));
             values[column] = 1.0 - shadow[column];
-            if is_shadowed && let Some(blocker) = maps.occluder(receiver.point) {
+            let is_held = is_shadowed && (hard.is_none() || by_map());
+            if is_held && let Some(blocker) = maps.occluder(receiver.point) {
                 let way = to_light(center, receiver.point);
                 let share = (blocker.point - receiver.point).dot(way) / way.length_squared();
                 // A blocker beyond the light, or below its own receiver by a texel's slope, has no penumbra.

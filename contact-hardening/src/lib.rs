@@ -2,6 +2,7 @@
 
 pub mod cpu;
 pub mod distance_map;
+pub mod filter;
 pub mod footprint;
 #[cfg(feature = "gpu")]
 pub mod gpu;
@@ -11,6 +12,7 @@ pub mod multi_pass;
 pub mod paper;
 mod params;
 pub mod physical;
+pub mod search;
 pub mod shadow_pyramid;
 mod show;
 pub mod smoothing;
@@ -22,7 +24,7 @@ use gnomon_shadow_map::filter_maps::FilterMaps;
 use gnomon_shadow_map::light_maps::LightMaps;
 use gnomon_shadow_map::{ShadowMap, ShadowMapParams, Variant as MapVariant};
 use scene_core::technique::{PreparedShadow, ShadowQuery, ShadowTechnique, TechniqueError};
-use scene_core::{Camera, GBuffer, Light, Report, VisibilityImage};
+use scene_core::{Camera, GBuffer, Report, VisibilityImage};
 
 use kernel::Kernel;
 use look_up::LookUps;
@@ -42,7 +44,7 @@ pub struct ContactHardening {
 /// Where hard shadows come from.
 #[derive(Clone, Default)]
 enum Source {
-    /// From whichever of the two below suits the light: see [`ContactHardening::new`].
+    /// With `physical` scaling exact ones: see [`ContactHardening::new`]. Else from the own map.
     #[default]
     Auto,
     /// From the map that blockers are found in.
@@ -62,9 +64,9 @@ pub struct PreparedContactHardening<'a> {
 impl ContactHardening {
     /// A technique with these settings.
     ///
-    /// With `physical` scaling the hard shadows of directional lights are shadow-map's `alias-free` ones, exact at
-    /// every pixel: a sun is far and small, so its penumbrae are mostly narrower than a texel of any map. Those of other
-    /// lights come from the [own map](Self::on_own_map).
+    /// With `physical` scaling hard shadows are shadow-map's `alias-free` ones, exact at every pixel: near a contact, and everywhere
+    /// under a sun, penumbrae are narrower than a texel of any map. With `paper` scaling they come from the
+    /// [own map](Self::on_own_map).
     pub fn new(params: ContactHardeningParams) -> Self {
         Self { params, source: Source::Auto }
     }
@@ -91,7 +93,7 @@ impl ContactHardening {
         }
     }
 
-    /// The technique whose hard shadows of some lights are blurred; those of others are the own map's.
+    /// The technique whose hard shadows are blurred; `None` for the own map's.
     fn source(&self) -> Option<Arc<dyn ShadowTechnique>> {
         match &self.source {
             Source::Auto if self.params.scaling == Scaling::Physical => {
@@ -105,11 +107,6 @@ impl ContactHardening {
             Source::Auto | Source::OwnMap => None,
             Source::Technique { technique, .. } => Some(technique.clone()),
         }
-    }
-
-    /// Whether the [source](Self::source) is asked for this light.
-    fn asks_source(&self, light: &Light) -> bool {
-        !matches!(self.source, Source::Auto) || matches!(light, Light::Directional { .. })
     }
 
     /// Pass 1: draws the map, and prepares the source.
@@ -146,9 +143,10 @@ impl ContactHardening {
         let params = self.params;
         let mut report = Report::default();
         let filter = FilterMaps::new(maps, params.skip, &mut report);
-        let look_ups = report.time("prepare.tiles", |_| LookUps::new(filter));
+        let asked = u64::from(query.camera.width) * u64::from(query.camera.height) * u64::from(params.taps);
+        let look_ups = report.time("prepare.tiles", |_| LookUps::new(filter, asked));
         report.bytes += look_ups.bytes();
-        let source = match self.source().filter(|_| self.asks_source(query.light)) {
+        let source = match self.source() {
             Some(source) => {
                 let (prepared, rest) = source.prepare(query)?;
                 report.merge_beside(&rest);

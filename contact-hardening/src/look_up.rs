@@ -1,18 +1,19 @@
 //! Look-ups in the map along the lines from one receiver to the light, where the image does not answer.
 //!
 //! What a line costs is one read of a depth, at a place that turns from pixel to pixel. So depths are kept in tiles that a
-//! cache line holds, the way to a texel is a line in the map's clip space, and a pyramid of nearest depths tells
-//! whether any texel under the whole [footprint](crate::footprint) rises above the receiver's plane: where none does, every
-//! line is lit.
+//! cache line holds, and read for many lines at once, so that the memory is waited for once. The way to a texel is a line in the map's
+//! clip space, and a pyramid of nearest depths tells whether any texel under the whole [footprint](crate::footprint) rises above the
+//! receiver's plane: where none does, every line is lit.
+//!
+//! Of a cube's faces the receiver's own is asked so; lines that leave it are asked one by one.
 
 use glam::{Vec2, Vec3, Vec3A};
 use gnomon_shadow_map::filter_maps::FilterMaps;
 use gnomon_shadow_map::light_cone::LightCone;
-use gnomon_shadow_map::light_maps::{LightMaps, Occluder, Receiver};
-use gnomon_shadow_map::receiver_plane::{is_near, meets, rises_above};
+use gnomon_shadow_map::light_maps::{LightMaps, Occluder, Receiver, ShadowMapView};
+use gnomon_shadow_map::receiver_plane::{meets, rises_above};
 use gnomon_shadow_map::texel_plane::TexelPlane;
 use rayon::prelude::*;
-use scene_core::Light;
 use scene_core::light::LightPoint;
 use scene_core::raster::DepthMap;
 
@@ -53,20 +54,40 @@ impl TiledDepth {
     }
 }
 
+/// Lines that are read at once.
+pub const BATCH: usize = 64;
+
+/// Calls `take` with up to [`BATCH`] of `points` at a time.
+pub fn batches(mut points: impl Iterator<Item = Vec2>, mut take: impl FnMut(&[Vec2])) {
+    let mut batch = [Vec2::ZERO; BATCH];
+    loop {
+        let mut count = 0;
+        for (slot, point) in batch.iter_mut().zip(&mut points) {
+            *slot = point;
+            count += 1;
+        }
+        if count == 0 {
+            return;
+        }
+        take(&batch[..count]);
+    }
+}
+
 /// The maps of a light, made ready for look-ups.
 #[derive(Clone, Debug)]
 pub struct LookUps<'a> {
     /// The maps, planes of their triangles, and nearest depths.
     pub filter: FilterMaps<'a>,
-    /// Of a lone map; the faces of a cube are asked one by one.
+    /// Of a lone map; the faces of a cube are asked in rows.
     tiled: Option<TiledDepth>,
 }
 
 impl<'a> LookUps<'a> {
-    /// `prepare.tiles`, beside what filters need.
-    pub fn new(filter: FilterMaps<'a>) -> Self {
+    /// `prepare.tiles`, beside what filters need, for pictures in which up to `look_ups` are made: tiles are made where that is
+    /// more than a map has texels, each of which has to be copied.
+    pub fn new(filter: FilterMaps<'a>, look_ups: u64) -> Self {
         let tiled = match filter.maps.maps.as_slice() {
-            [lone] => Some(TiledDepth::new(&lone.map)),
+            [lone] if look_ups > lone.map.depth.len() as u64 => Some(TiledDepth::new(&lone.map)),
             _ => None,
         };
         Self { filter, tiled }
@@ -84,22 +105,27 @@ impl<'a> LookUps<'a> {
 
     /// The lines from `receiver` to the light over `cone`.
     pub fn lines(&self, receiver: &Receiver, cone: &LightCone) -> Lines<'_, 'a> {
-        let lone = match (self.maps().maps.as_slice(), &self.tiled) {
-            ([map], Some(tiled)) => {
-                let size = map.map.width;
-                let clip = |v: Vec3, w: f32| {
-                    let clip = map.view.projection_from_world * v.extend(w);
-                    let half = 0.5 * size as f32;
-                    Vec3A::new((clip.w + clip.x) * half, (clip.w - clip.y) * half, clip.w)
-                };
-                let ways = [cone.w, cone.u, cone.v].map(|axis| clip(axis, 0.0));
-                let plane = TexelPlane::new(&map.view, size, receiver);
-                Some(Lone { tiled, size, receiver: clip(receiver.point, 1.0), ways, plane })
-            }
-            _ => None,
-        };
-        let parallel = matches!(self.maps().light, Light::Directional { .. });
-        Lines { look_ups: self, receiver: *receiver, cone: *cone, share: cone.share_axis(), parallel, lone }
+        let views = &self.maps().maps;
+        let holds = |map: &ShadowMapView| map.view.project(receiver.point).is_some();
+        let index = if views.len() == 1 { Some(0) } else { views.iter().position(holds) };
+        let face = index.map(|index| {
+            let map = &views[index];
+            let size = map.map.width;
+            let clip = |v: Vec3, w: f32| {
+                let clip = map.view.projection_from_world * v.extend(w);
+                let half = 0.5 * size as f32;
+                Vec3A::new((clip.w + clip.x) * half, (clip.w - clip.y) * half, clip.w)
+            };
+            let ways = [cone.w, cone.u, cone.v].map(|axis| clip(axis, 0.0));
+            let plane = TexelPlane::new(&map.view, size, receiver);
+            let is_lone = views.len() == 1;
+            let tiled = self.tiled.as_ref();
+            Face { tiled, map, index, is_lone, size, receiver: clip(receiver.point, 1.0), ways, plane }
+        });
+        let center = self.maps().light.center();
+        let parallel = matches!(center, LightPoint::Towards(_));
+        let near = NearSurface::new(receiver, center);
+        Lines { look_ups: self, receiver: *receiver, cone: *cone, near, parallel, face }
     }
 }
 
@@ -108,8 +134,43 @@ impl<'a> LookUps<'a> {
 pub enum Met {
     /// Nothing that shadows the receiver.
     Nothing,
-    /// A blocker at this share of the way.
-    Blocker(f32),
+    /// A blocker, in the light's coordinates ([`LightCone::locate`]); it need not lie on the line, nor in the cone.
+    Blocker(Vec3),
+}
+
+/// What is stored where a line is at some distance.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Texel {
+    column: u32,
+    row: u32,
+    /// Reversed; 0 where there is nothing, NaN where another face holds the place.
+    depth: f32,
+}
+
+impl Texel {
+    const ELSEWHERE: Self = Self { column: 0, row: 0, depth: f32::NAN };
+}
+
+/// Question 3 of shadow-map's `receiver_plane` for one receiver: see [`is_near`](gnomon_shadow_map::receiver_plane::is_near).
+#[derive(Clone, Copy, Debug)]
+struct NearSurface {
+    to_light: Vec3,
+    /// 1 + tan θ of the receiver's slope against the light.
+    slope: f32,
+}
+
+impl NearSurface {
+    fn new(receiver: &Receiver, center: LightPoint) -> Self {
+        let (to_light, _) = center.ray_from(receiver.point);
+        let to_light = to_light.normalize_or_zero();
+        let cos = receiver.normal.dot(to_light).max(f32::MIN_POSITIVE);
+        Self { to_light, slope: 1.0 + (1.0 - cos * cos).max(0.0).sqrt() / cos }
+    }
+
+    #[inline]
+    fn holds(&self, from_receiver: Vec3, texel: f32) -> bool {
+        from_receiver.dot(self.to_light) <= texel * self.slope
+    }
 }
 
 /// The lines from one receiver to the points of the light.
@@ -118,16 +179,19 @@ pub struct Lines<'l, 'a> {
     look_ups: &'l LookUps<'a>,
     receiver: Receiver,
     cone: LightCone,
-    /// Its product with a vector from the receiver is a share of the way to the light.
-    share: Vec3,
+    near: NearSurface,
     parallel: bool,
-    lone: Option<Lone<'l>>,
+    face: Option<Face<'l>>,
 }
 
-/// The lines in the texels of a lone map, before the division by the third coordinate.
+/// The lines in the texels of the view that holds the receiver, or of the lone one, before the division by the third coordinate.
 #[derive(Clone, Copy, Debug)]
-struct Lone<'l> {
-    tiled: &'l TiledDepth,
+struct Face<'l> {
+    tiled: Option<&'l TiledDepth>,
+    map: &'l ShadowMapView,
+    index: usize,
+    /// Whether nothing is stored beside the map.
+    is_lone: bool,
     size: u32,
     receiver: Vec3A,
     /// To the light's centre, and along its half axes.
@@ -135,10 +199,29 @@ struct Lone<'l> {
     plane: TexelPlane,
 }
 
-impl Lone<'_> {
+impl Face<'_> {
     #[inline]
     fn place(&self, at: Vec2, t: f32) -> Vec3A {
         self.receiver + (self.ways[0] + self.ways[1] * at.x + self.ways[2] * at.y) * t
+    }
+
+    /// The texel where the line to `at` is at `t`.
+    #[inline]
+    fn texel(&self, at: Vec2, t: f32) -> Texel {
+        let place = self.place(at, t);
+        let end = self.size as f32 * place.z;
+        let inside = place.z > 0.0 && place.x >= 0.0 && place.y >= 0.0 && place.x <= end && place.y <= end;
+        if !inside {
+            return if self.is_lone { Texel::default() } else { Texel::ELSEWHERE };
+        }
+        // NDC 1 belongs to the last texel.
+        let cell = |at: f32| ((at / place.z) as u32).min(self.size - 1);
+        let (column, row) = (cell(place.x), cell(place.y));
+        let depth = match self.tiled {
+            Some(tiled) => tiled.at(column as usize, row as usize),
+            None => self.map.map.depth[row as usize * self.size as usize + column as usize],
+        };
+        Texel { column, row, depth }
     }
 
     /// Least and greatest column and row under the footprint of the light, `reach` times as wide. `None` where it is
@@ -157,17 +240,21 @@ impl Lone<'_> {
     }
 
     /// Whether no texel under the footprint of the light, `reach` times as wide, rises above the receiver's plane.
-    fn is_clear(&self, map: &FilterMaps<'_>, reach: f32, t: f32) -> bool {
+    fn is_clear(&self, maps: &FilterMaps<'_>, reach: f32, t: f32) -> bool {
         let Some((min, max)) = self.bounds(reach, t) else { return false };
         // Places are rounded: a texel more on each side holds every line.
-        let (min, max) = ((min - 1.0).max(Vec2::ZERO), max + 1.0);
+        let (min, max) = (min - 1.0, max + 1.0);
         let end = self.size as f32 - 1.0;
+        if !self.is_lone && (min.cmplt(Vec2::ZERO).any() || max.cmpgt(Vec2::splat(end)).any()) {
+            return false;
+        }
+        let min = min.max(Vec2::ZERO);
         if max.cmplt(Vec2::ZERO).any() || min.cmpgt(Vec2::splat(end + 1.0)).any() {
             return true;
         }
         let [first, last] = [min, max].map(|at| at.min(Vec2::splat(end)).to_array().map(f32::floor));
         let whole = |at: [f32; 2]| at.map(|at| at as usize);
-        let nearest = map.pyramids[0].nearest(&map.maps.maps[0].map, whole(first), whole(last));
+        let nearest = maps.pyramids[self.index].nearest(&self.map.map, whole(first), whole(last));
         self.plane.hides_none(first, last, nearest)
     }
 }
@@ -175,70 +262,85 @@ impl Lone<'_> {
 impl Lines<'_, '_> {
     /// Whether it is proved that no line meets anything within the footprint at `t`, `reach` times the light's.
     pub fn is_clear(&self, reach: f32, t: f32) -> bool {
-        self.lone.is_some_and(|lone| lone.is_clear(&self.look_ups.filter, reach, t))
+        self.face.is_some_and(|face| face.is_clear(&self.look_ups.filter, reach, t))
     }
 
     /// How many texels the footprint at `t` is wide where it is narrowest, `reach` times the light's. `None` where it is
-    /// unbounded, or the faces of a cube hold it.
+    /// unbounded, or no map holds the receiver.
     pub fn width(&self, reach: f32, t: f32) -> Option<f32> {
-        let (min, max) = self.lone.as_ref()?.bounds(reach, t)?;
+        let (min, max) = self.face.as_ref()?.bounds(reach, t)?;
         Some((max - min).min_element())
+    }
+
+    /// Reads what is stored where the lines to `points` are at `t` of their index; those without a `t` are left out.
+    #[inline]
+    pub fn read(&self, points: &[Vec2], t: impl Fn(usize) -> Option<f32>, texels: &mut [Texel]) {
+        let Some(face) = &self.face else {
+            texels.fill(Texel::ELSEWHERE);
+            return;
+        };
+        for (index, (&at, texel)) in points.iter().zip(texels).enumerate() {
+            if let Some(t) = t(index) {
+                *texel = face.texel(at, t);
+            }
+        }
     }
 
     /// The surface stored where the line to the light's point `at` is at `t`, if it shadows the receiver.
     #[inline]
     pub fn look_up(&self, at: Vec2, t: f32) -> Met {
-        let stored = match &self.lone {
-            Some(lone) => self.stored(lone, at, t),
-            None => {
-                let Receiver { point, normal, tolerance, .. } = self.receiver;
-                let stored = self.look_ups.maps().occluder(point + self.cone.direction(at) * t);
-                stored.filter(|stored| rises_above(stored.point, point, normal, tolerance))
-            }
-        };
-        stored.map_or(Met::Nothing, |stored| self.ask(&stored, at))
+        let texel = self.face.as_ref().map_or(Texel::ELSEWHERE, |face| face.texel(at, t));
+        self.meet(&texel, at, t)
     }
 
-    /// What the texel holds, if that rises above the receiver's plane.
+    /// The same where the texel is [read](Self::read) already.
     #[inline]
-    fn stored(&self, lone: &Lone<'_>, at: Vec2, t: f32) -> Option<Occluder> {
-        let place = lone.place(at, t);
-        let end = lone.size as f32 * place.z;
-        let inside = place.z > 0.0 && place.x >= 0.0 && place.y >= 0.0 && place.x <= end && place.y <= end;
-        if !inside {
-            return None;
+    pub fn meet(&self, texel: &Texel, at: Vec2, t: f32) -> Met {
+        match &self.face {
+            Some(face) if !texel.depth.is_nan() => {
+                let rises = texel.depth > 0.0
+                    && face.plane.rise(texel.column as f32, texel.row as f32, texel.depth) > 0.0;
+                if rises { self.ask(&occluder(face, texel), at) } else { Met::Nothing }
+            }
+            _ => self.meet_elsewhere(at, t),
         }
-        // NDC 1 belongs to the last texel.
-        let cell = |at: f32| ((at / place.z) as usize).min(lone.size as usize - 1);
-        let (column, row) = (cell(place.x), cell(place.y));
-        let depth = lone.tiled.at(column, row);
-        if depth <= 0.0 || lone.plane.rise(column as f32, row as f32, depth) <= 0.0 {
-            return None;
-        }
-        let map = &self.look_ups.maps().maps[0];
-        let texel = 2.0 / lone.size as f32;
-        let center = Vec2::new(column as f32 + 0.5, row as f32 + 0.5) * texel;
-        Some(Occluder {
-            point: map.view.unproject(Vec2::new(center.x - 1.0, 1.0 - center.y), depth),
-            triangle: map.triangles[row * lone.size as usize + column] as usize,
-            texel: map.view.half_diagonal(depth) * texel,
-        })
+    }
+
+    #[cold]
+    fn meet_elsewhere(&self, at: Vec2, t: f32) -> Met {
+        let Receiver { point, normal, tolerance, .. } = self.receiver;
+        let stored = self.look_ups.maps().occluder(point + self.cone.direction(at) * t);
+        let stored = stored.filter(|stored| rises_above(stored.point, point, normal, tolerance));
+        stored.map_or(Met::Nothing, |stored| self.ask(&stored, at))
     }
 
     /// The questions of shadow-map's `receiver_plane`; a neighbour on the same surface is asked outright, by the line to
     /// this point of the light.
     #[inline]
     fn ask(&self, stored: &Occluder, at: Vec2) -> Met {
-        let Receiver { point, normal, tolerance, .. } = self.receiver;
+        let Receiver { point, tolerance, .. } = self.receiver;
         let maps = self.look_ups.maps();
-        let share = self.share.dot(stored.point - point);
-        let before_light = share > 0.0 && (share < 1.0 || self.parallel);
+        let located = self.cone.locate(stored.point);
+        let before_light = located.z > 0.0 && (located.z < 1.0 || self.parallel);
         if !(before_light && self.look_ups.filter.is_behind(stored.triangle, point, tolerance)) {
             return Met::Nothing;
         }
         let line = || LightPoint::Towards(self.cone.direction(at));
-        let blocks = !is_near(stored.point, point, normal, maps.light.center(), stored.texel)
+        let blocks = !self.near.holds(stored.point - point, stored.texel)
             || meets(maps.scene.corners(stored.triangle), point, line());
-        if blocks { Met::Blocker(share) } else { Met::Nothing }
+        if blocks { Met::Blocker(located) } else { Met::Nothing }
+    }
+}
+
+/// What a texel of a face holds.
+#[inline]
+fn occluder(face: &Face<'_>, texel: &Texel) -> Occluder {
+    let ShadowMapView { view, triangles, .. } = face.map;
+    let wide = 2.0 / face.size as f32;
+    let center = Vec2::new(texel.column as f32 + 0.5, texel.row as f32 + 0.5) * wide;
+    Occluder {
+        point: view.unproject(Vec2::new(center.x - 1.0, 1.0 - center.y), texel.depth),
+        triangle: triangles[texel.row as usize * face.size as usize + texel.column as usize] as usize,
+        texel: view.half_diagonal(texel.depth) * wide,
     }
 }

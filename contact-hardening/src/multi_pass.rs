@@ -5,8 +5,8 @@
 //! A pixel is left out of a pass if all that the pass can reach is equal: it would get that value.
 //!
 //! Passes ask pixels, each of which is lit or shadowed as a whole. With `fill`, a footprint narrower than the kernel's
-//! points are many takes no passes: the map answers at once, as for `gaussian`, and shadows thinner than pixels stay. To
-//! others such a pixel answers with the S of pass 2.
+//! points are many takes no passes if the map is finer than pixels: it answers at once, as for `gaussian`, and shadows thinner
+//! than pixels stay. To others such a pixel answers with the S of pass 2.
 
 use glam::Vec2;
 use rayon::iter::Either;
@@ -38,7 +38,7 @@ pub fn multi_pass(physical: &Physical<'_>, sites: &[Site]) -> (Vec<f32>, u64) {
         let passes = (radius.ceil() as u32).clamp(1, physical.params.passes);
         let [x, y] = site.receiver.pixel.map(|at| at as usize);
         let pixel = y * width + x;
-        if physical.params.fill && physical.is_narrow(site, &lines, t) {
+        if physical.is_narrow(site, t) && physical.asks_map_first(site, &lines, t) {
             return Some(Either::Right((pixel, 1.0 - physical.filter(site, &lines, &blockers, t, &mut 0))));
         }
         Some(Either::Left(Active { site: *site, pixel, t, passes }))

@@ -114,7 +114,7 @@ fn any_technique_can_be_the_source() {
         let hard = ShadowMap::new(ShadowMapParams { map_size, ..Default::default() });
         ContactHardening::new(params).on_top_of("hard", Arc::new(hard))
     };
-    let own = shade(ContactHardening::new(params));
+    let own = shade(ContactHardening::new(params).on_own_map());
     assert_eq!(own, shade(source(256)));
     assert_ne!(own, shade(source(16)), "the source is asked");
 }
@@ -126,7 +126,7 @@ fn any_technique_can_be_the_source() {
 fn far_from_zero_shadows_stay() {
     let near = scenes::build("chess", 0.0).expect("built in");
     let offset = Vec3::new(1.0, 0.5, -1.0) * (1e4 * near.scene.bounds().diagonal());
-    let rmse = |offset: Vec3| {
+    let rmse = |technique: &ContactHardening, offset: Vec3| {
         let scene = near.scene.counted_from(-offset);
         let light = match near.lights[0] {
             Light::Spot { position, direction, outer, inner } => {
@@ -141,14 +141,17 @@ fn far_from_zero_shadows_stay() {
         let settings = ReferenceSettings { samples: 1, ..Default::default() };
         let truth =
             reference::reference(&scene, &casters, &light, &gbuffer, &settings, &no_progress).expect("valid");
-        let technique = Factory.create(None, &[]).expect("defaults");
         let query = ShadowQuery { scene: &scene, light: &light, camera: &camera };
         let (prepared, _) = technique.prepare(&query).expect("supported");
         let mut image = VisibilityImage::new(96, 72);
-        prepared.shade(&gbuffer, &mut image).expect("same size");
+        prepared.shade(&camera, &gbuffer, &mut image).expect("same size");
         let valid = reference::valid_pixels(&gbuffer, &light);
         metrics::errors(&image, &truth.visibility, &valid).expect("same size").rmse
     };
-    let (here, there) = (rmse(Vec3::ZERO), rmse(offset));
-    assert!(there < 1.5 * here, "{there} where it is {here} at zero");
+    // Exact hard shadows stay exact.
+    let exact = ContactHardening::default();
+    for technique in [exact.clone().on_own_map(), exact] {
+        let (here, there) = (rmse(&technique, Vec3::ZERO), rmse(&technique, offset));
+        assert!(there <= 1.5 * here, "{}: {there} where it is {here} at zero", technique.source_name());
+    }
 }

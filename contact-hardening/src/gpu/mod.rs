@@ -50,8 +50,6 @@ pub struct ContactHardeningOnGpu {
 struct SourceOnGpu {
     technique: Box<dyn GpuShadowTechnique>,
     image: Image,
-    /// Whether the light prepared last is one that it is asked for.
-    is_asked: bool,
 }
 
 /// A step with its pipeline.
@@ -124,7 +122,7 @@ impl ContactHardeningOnGpu {
         let source = match technique.source() {
             Some(source) => {
                 let technique = source.gpu(device, ONE)?;
-                Some(SourceOnGpu { technique, image: Image::new("V of the source", ONE), is_asked: false })
+                Some(SourceOnGpu { technique, image: Image::new("V of the source", ONE) })
             }
             None => None,
         };
@@ -205,10 +203,6 @@ impl ContactHardeningOnGpu {
         self.receivers.prepare(device, query);
         report.bytes = self.bytes();
         if let Some(source) = &mut self.source {
-            source.is_asked = self.technique.asks_source(query.light);
-            if !source.is_asked {
-                return Ok(report);
-            }
             let rest = source.technique.prepare(recorder, query)?;
             report.merge_beside(&rest);
         }
@@ -232,12 +226,12 @@ impl ContactHardeningOnGpu {
         let receivers = self.receivers.group(device, camera, gbuffer).ok_or_else(not_prepared)?;
         let mut report = Report::default();
         let source = match &mut self.source {
-            Some(SourceOnGpu { technique, image, is_asked: true }) => {
+            Some(SourceOnGpu { technique, image }) => {
                 let view = image.get(device, size);
                 report.merge(&technique.shade(recorder, camera, gbuffer, &view)?);
                 Some(view)
             }
-            _ => None,
+            None => None,
         };
         let settings = SettingsTable::new(
             &self.technique.params,
@@ -293,6 +287,6 @@ impl ContactHardeningOnGpu {
 
     /// Whether the preparation holds for any camera.
     pub fn survives_camera(&self) -> bool {
-        self.source.as_ref().is_none_or(|source| !source.is_asked || source.technique.survives_camera())
+        self.source.as_ref().is_none_or(|source| source.technique.survives_camera())
     }
 }
