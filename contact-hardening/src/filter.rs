@@ -43,32 +43,29 @@ enum Fill {
 struct Layers {
     t: [f32; MAX_LAYERS],
     count: usize,
+    /// How far from a layer stored blockers count as passed there: logarithm of a ratio.
+    half: f32,
 }
 
 impl Layers {
     fn new(which: Blocker, blockers: &Blockers, mean: f32) -> Self {
-        let mut layers = Self { t: [mean; MAX_LAYERS], count: 1 };
+        let mut layers = Self { t: [mean; MAX_LAYERS], count: 1, half: f32::INFINITY };
         match which {
             Blocker::Average => {}
             Blocker::Minimum => layers.t[0] = blockers.least,
             Blocker::Each => {
-                // A step widens the footprint by at most √2.
+                // A step widens the footprint by at most √2. Half a step to each side leaves no gap between layers; where they are
+                // closer, a blocker must not fall between them by rounding.
                 let ratio = blockers.greatest / blockers.least;
                 layers.count = 1 + (2.0 * ratio.log2()).ceil().min((MAX_LAYERS - 1) as f32) as usize;
-                if layers.count > 1 {
-                    let last = (layers.count - 1) as f32;
-                    for (index, t) in layers.t[..layers.count].iter_mut().enumerate() {
-                        *t = blockers.least * ratio.powf(index as f32 / last);
-                    }
+                let last = (layers.count - 1).max(1) as f32;
+                for (index, t) in layers.t[..layers.count].iter_mut().enumerate() {
+                    *t = blockers.least * ratio.powf(index as f32 / last);
                 }
+                layers.half = (0.5 * ratio.ln() / last).max(0.25 * std::f32::consts::LN_2);
             }
         }
         layers
-    }
-
-    /// Half the logarithm of a step's ratio.
-    fn half_step(&self) -> f32 {
-        if self.count > 1 { 0.5 * (self.t[1] / self.t[0]).ln() } else { f32::INFINITY }
     }
 }
 
@@ -153,7 +150,7 @@ impl Asker<'_> {
     fn pass(&self, points: &[Vec2], layer: usize, states: &mut [State]) {
         let t = self.layers.t[layer];
         let (is_first, is_last) = (layer == 0, layer + 1 == self.layers.count);
-        let half = self.layers.half_step();
+        let half = self.layers.half;
         let mut texels = [Texel::default(); BATCH];
         let from_map = self.map_first && self.fill[layer] == Fill::Map;
         if from_map {
@@ -172,7 +169,7 @@ impl Asker<'_> {
             let above = (located.z / t).ln();
             // The search finds some blockers: others may be nearer than the first layer, where they stand in the cone,
             // or beyond the last.
-            let is_within = (above >= -half || is_first && self.site.cone.contains(located))
+            let is_within = (above >= -half || is_first && self.physical.covers(self.site, located))
                 && (above <= half || is_last);
             state.blocked = is_within || above * state.before < 0.0;
             state.before = above;

@@ -136,6 +136,13 @@ impl Physical<'_> {
         turned.map(move |(point, weight)| (cone.share(point), weight))
     }
 
+    /// Whether a point with these coordinates lies between the receiver and the kernel.
+    #[inline]
+    pub(crate) fn covers(&self, site: &Site, located: Vec3) -> bool {
+        let reach = self.kernel.reach;
+        site.cone.contains(located / Vec3::new(reach, reach, 1.0))
+    }
+
     /// The pixel at a place of the image.
     #[inline]
     pub(crate) fn pixel(&self, at: Option<Vec2>) -> Option<usize> {

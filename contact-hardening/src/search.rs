@@ -7,7 +7,6 @@
 //! Every point of the kernel is asked at the farthest blocker's distance, t. A nearer one has a narrower footprint, which few points
 //! of the wide one hit: so every second point is asked nearer, too, at shares of t that are spread evenly.
 
-use glam::Vec3;
 use gnomon_shadow_map::light_maps::Receiver;
 use gnomon_shadow_map::receiver_plane::rises_above;
 
@@ -16,8 +15,9 @@ use crate::look_up::{BATCH, Lines, Met, Texel, batches};
 use crate::physical::{Physical, Site};
 use crate::shadow_pyramid::PixelRect;
 
-/// The golden ratio less one: multiples of it, without their whole parts, are spread evenly however many they are.
-const GOLDEN: f32 = 0.618_034;
+/// How far from one to the next nearer distance it is, in 64ths: the golden section of 64, odd. Its multiples are spread evenly
+/// however many they are, and floats hold them exactly.
+const GOLDEN: usize = 39;
 
 /// Distances of the blockers in a cone, as D.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,7 +53,7 @@ impl Blockers {
 /// Where a point of the light, the `index`th, is asked for blockers up to `t`, beside `t` itself.
 #[inline]
 fn nearer(index: usize, t: f32) -> Option<f32> {
-    (index % 2 == 1).then(|| t * ((index as f32 + 0.5) * GOLDEN).fract())
+    (index % 2 == 1).then(|| t * (((index * GOLDEN % 64) as f32 + 0.5) / 64.0))
 }
 
 impl Physical<'_> {
@@ -129,8 +129,8 @@ impl Physical<'_> {
         }
         let Receiver { point, normal, tolerance, .. } = site.receiver;
         let blocker = self.blocker(pixel);
-        let located = site.cone.locate(blocker) / Vec3::new(self.kernel.reach, self.kernel.reach, 1.0);
-        if site.cone.contains(located) && rises_above(blocker, point, normal, tolerance) {
+        let located = site.cone.locate(blocker);
+        if self.covers(site, located) && rises_above(blocker, point, normal, tolerance) {
             blockers.add(located.z, self.is_parallel());
         }
     }
