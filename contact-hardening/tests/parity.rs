@@ -15,7 +15,7 @@ use gnomon_contact_hardening::{
     Blocker, ContactHardening, ContactHardeningParams, GaussianKernel, Scaling, Show, Variant,
 };
 use gnomon_shadow_map::light_maps::LightMaps;
-use gnomon_shadow_map::{ShadowMap, ShadowMapParams};
+use gnomon_shadow_map::{ShadowMap, ShadowMapParams, Variant as MapVariant};
 use scene_core::gpu::headless::VISIBILITY_FORMAT;
 use scene_core::gpu::{Gpu, testing};
 use scene_core::light::sampling::SampleKey;
@@ -56,14 +56,17 @@ fn on_cpu(
     image
 }
 
-/// The G-buffer with every position moved.
+/// The G-buffer with every position moved, to the side of its surface that is seen: exact hard shadows lift a position by less than
+/// that, and below its surface all of it would be in its own shadow.
 fn moved(gbuffer: &GBuffer, eye: Vec3, trial: u32) -> GBuffer {
     let mut result = gbuffer.clone();
     for (pixel, position) in (0u32..).zip(&mut result.position) {
         let key = SampleKey::new(u64::from(trial), u64::from(pixel));
         let [a, b] = [key.square(0), key.square(1)];
         let largest = position.abs().max_element().max(eye.abs().max_element());
-        *position += (Vec3::new(a.x, a.y, b.x) * 2.0 - 1.0) * (largest * ROUNDING);
+        let step = (Vec3::new(a.x, a.y, b.x) * 2.0 - 1.0) * (largest * ROUNDING);
+        let normal = gbuffer.normal[pixel as usize];
+        *position += step - normal * (2.0 * normal.dot(step).min(0.0));
     }
     result
 }
@@ -113,7 +116,8 @@ fn compare(gpu: &Gpu, case: &Case<'_>, technique: &ContactHardening, shown: &Con
 
 /// The CPU's maps with what the GPU's texels hold.
 fn maps_of<'a>(gpu: &Gpu, case: &Case<'a>, on_gpu: &ContactHardeningOnGpu) -> LightMaps<'a> {
-    let settings = ShadowMapParams { map_size: MAP_SIZE, ..Default::default() };
+    // The variant that pass 1 draws for: it decides which faces of a cube there are.
+    let settings = ShadowMapParams { variant: MapVariant::Pcf, map_size: MAP_SIZE, ..Default::default() };
     let mut maps = LightMaps::draw(case.scene, case.light, &settings, &mut Report::default(), |_, _, _| None);
     let (depths, layer) = on_gpu.depths().unwrap();
     let depths: Vec<f32> = gpu.read_buffer(depths).unwrap();
