@@ -57,6 +57,9 @@ pub(crate) struct RunReport {
     pub(crate) bytes: u64,
     /// What was skipped, and how many of it.
     pub(crate) skipped: BTreeMap<String, u64>,
+    /// What the cost grows with, and how many of it.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) counted: BTreeMap<String, u64>,
     /// Triangles of the scene.
     pub(crate) triangles: usize,
     /// Pixels a row.
@@ -93,6 +96,7 @@ impl RunReport {
             shade_ms,
             bytes: report.bytes,
             skipped: report.skipped,
+            counted: report.counted,
             triangles: view.setup.scene.triangles().len(),
             width: view.setup.camera.width,
             height: view.setup.camera.height,

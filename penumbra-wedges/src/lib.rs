@@ -123,6 +123,7 @@ impl PreparedWedges<'_> {
             report.skip("pixels outside of a wedge", work.pairs - work.inside);
         }
         report.skip("pixels the light cannot reach", work.dark);
+        report.count("penumbra pixels", work.penumbra);
         (report, work)
     }
 

@@ -36,6 +36,7 @@ fn wedges_are_left_out_for_tiles_and_pixels() {
             let report = compare(&setup.scene, &setup.lights[0], &camera, params);
             assert!(report.skipped["wedges outside of a tile"] > 0, "{spec}");
             assert!(report.skipped["pixels outside of a wedge"] > 0, "{spec}");
+            assert!(report.counted["penumbra pixels"] > 0, "{spec}");
         }
     }
 }

@@ -16,6 +16,9 @@ pub struct Report {
     pub bytes: u64,
     /// What was skipped → how many of it.
     pub skipped: BTreeMap<String, u64>,
+    /// What the cost grows with → how many of it: `penumbra pixels`, say.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub counted: BTreeMap<String, u64>,
     /// What it ran on; none on the CPU. Filled in by who owns the device.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gpu: Option<GpuUse>,
@@ -44,13 +47,21 @@ impl Report {
         *self.skipped.entry(what.to_owned()).or_default() += count;
     }
 
-    /// Adds another step's times and skips; the larger number of bytes stands.
+    /// Books `number` things that the cost grows with.
+    pub fn count(&mut self, what: &str, number: u64) {
+        *self.counted.entry(what.to_owned()).or_default() += number;
+    }
+
+    /// Adds another step's times, skips and counts; the larger number of bytes stands.
     pub fn merge(&mut self, other: &Self) {
         for (stage, ms) in &other.stages_ms {
             *self.stages_ms.entry(stage.clone()).or_default() += ms;
         }
         for (what, count) in &other.skipped {
             self.skip(what, *count);
+        }
+        for (what, number) in &other.counted {
+            self.count(what, *number);
         }
         self.bytes = self.bytes.max(other.bytes);
         if self.gpu.is_none() {
@@ -76,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn merging_adds_times_and_skips() {
+    fn merging_adds_times_skips_and_counts() {
         let mut report = Report::default();
         assert_eq!(
             report.time("prepare.map", |r| {
@@ -88,7 +99,10 @@ mod tests {
         let mut other = Report { bytes: 9, ..Default::default() };
         other.stages_ms.insert("shade.lookup".into(), 3.0);
         other.skip("faces", 3);
+        report.count("taps", 5);
+        other.count("taps", 2);
         report.merge(&other);
+        assert_eq!(report.counted["taps"], 7);
         assert_eq!(report.skipped["faces"], 5);
         assert_eq!(report.total_ms("shade."), 3.0);
         assert_eq!(report.bytes, 9);
