@@ -102,7 +102,7 @@ impl GpuShadowTechnique for ShadowMapOnGpu {
     }
 
     fn survives_camera(&self) -> bool {
-        true
+        ShadowMapOnGpu::survives_camera(self)
     }
 }
 

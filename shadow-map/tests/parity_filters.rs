@@ -7,6 +7,7 @@ mod explained;
 
 use glam::Vec3;
 use gnomon_shadow_map::gpu::ShadowMapOnGpu;
+use gnomon_shadow_map::light_maps::ShadowMapView;
 use gnomon_shadow_map::receiver_plane::{plane_tolerance, view_tolerance};
 use gnomon_shadow_map::{Kernel, ShadowMap, ShadowMapParams, Variant};
 use scene_core::gpu::headless::VISIBILITY_FORMAT;
@@ -26,7 +27,25 @@ struct Case<'a> {
     light: Light,
 }
 
+/// What of an image was compared.
+#[derive(Clone, Copy, Debug)]
+struct Agreement {
+    /// Valid pixels, and how many of them differ between the backends.
+    valid: [usize; 2],
+    /// Valid pixels that differ where the CPU looks the GPU's maps up.
+    over_maps: usize,
+    /// Texels that hold something on either side, and how many of them hold another triangle on the other.
+    texels: [usize; 2],
+}
+
+/// The design's bound.
 fn check(gpu: &Gpu, case: &Case<'_>, params: ShadowMapParams) {
+    let Agreement { valid: [asked, differ], .. } = compare(gpu, case, params);
+    assert!(differ * 1000 <= asked, "{}, {params:?}: {differ} of {asked} valid pixels differ", case.name);
+}
+
+/// Runs both backends and explains every difference.
+fn compare(gpu: &Gpu, case: &Case<'_>, params: ShadowMapParams) -> Agreement {
     let Case { name, scene, camera, light } = *case;
     let gbuffer = raster::render_gbuffer(scene, camera);
     let (on_cpu, mut cpu_report) = ShadowMap::new(params).prepare(scene, &light);
@@ -52,16 +71,24 @@ fn check(gpu: &Gpu, case: &Case<'_>, params: ShadowMapParams) {
     );
     let label = format!("{name}, {:?} {:?}, {light:?}", params.variant, params.kernel);
     println!("{label}: {differ} of {asked} valid pixels differ");
-    assert!(differ * 1000 <= asked, "{label}: {differ} of {asked} valid pixels differ");
 
     let maps = explained::maps_of_gpu(gpu, &on_gpu, scene, &light, &params);
-    let texels: Vec<_> = maps.maps.iter().map(|map| map.view).collect();
+    let views: Vec<_> = maps.maps.iter().map(|map| map.view).collect();
+    let mut texels = [0; 2];
+    for (on_gpu, on_cpu) in maps.maps.iter().zip(on_cpu.maps()) {
+        let of =
+            |map: &ShadowMapView, texel: usize| (map.map.depth[texel] > 0.0).then(|| map.triangles[texel]);
+        for texel in 0..on_gpu.triangles.len() {
+            let [a, b] = [of(on_gpu, texel), of(on_cpu, texel)];
+            texels[0] += usize::from(a.or(b).is_some());
+            texels[1] += usize::from(a != b);
+        }
+    }
     let on_cpu = explained::over_gpu_maps(params, maps);
     let tolerance = plane_tolerance(scene.bounds(), &light);
     let reach = |pixel: usize| {
         let point = gbuffer.position[pixel];
-        let texel =
-            texels.iter().map(|view| view.half_diagonal(view.depth_of(point)) * 2.0 / MAP_SIZE as f32);
+        let texel = views.iter().map(|view| view.half_diagonal(view.depth_of(point)) * 2.0 / MAP_SIZE as f32);
         let border = BORDER * texel.filter(|size| *size > 0.0).fold(0.0, f32::max);
         border.max(tolerance + view_tolerance(gbuffer.depth[pixel]))
     };
@@ -74,6 +101,11 @@ fn check(gpu: &Gpu, case: &Case<'_>, params: ShadowMapParams) {
             expected.values[pixel],
         );
     }
+    on_cpu.shade(&gbuffer, &mut expected);
+    let over_maps = seen
+        .iter()
+        .filter(|&&p| valid[p] && (run.visibility.values[p] - expected.values[p]).abs() > 1.0 / 255.0);
+    Agreement { valid: [asked, differ], over_maps: over_maps.count(), texels }
 }
 
 fn variant(variant: Variant, kernel: Kernel) -> ShadowMapParams {
@@ -98,6 +130,36 @@ fn filters_agree_on_every_kind_of_view() {
             ] {
                 check(&gpu, &Case { name, scene, camera, light }, variant(kind, kernel));
             }
+        }
+    }
+}
+
+/// The scene's own light, on a small picture, stage by stage: maps agree in 99.9 % of their texels, and looked up in the same maps
+/// V agrees in 99.9 % of the pixels; so do both together.
+///
+/// But in the forest: thirty leaves and more lie over a texel, so that the last digits of their corners and depths say which is
+/// stored in one of two thousand. `pcf` reads 36 texels a pixel, and each is a twenty-fifth of V.
+#[test]
+fn filters_agree_on_every_built_in_scene() {
+    let Some(gpu) = testing::gpu() else { return };
+    for name in scenes::all().iter().map(|scene| scene.name) {
+        let setup = scenes::build(name, 0.4).unwrap();
+        let (scene, camera) = (&setup.scene, &setup.camera.with_size(80, 60));
+        for (kind, kernel) in [
+            (Variant::Pcf, Kernel::Grid),
+            (Variant::Pcf, Kernel::PoissonDisk),
+            (Variant::ObjectId, Kernel::Grid),
+            (Variant::Pcss, Kernel::Grid),
+            (Variant::Moments, Kernel::Grid),
+        ] {
+            let params = variant(kind, kernel);
+            let found = compare(&gpu, &Case { name, scene, camera, light: setup.lights[0] }, params);
+            let label = format!("{name}, {kind:?} {kernel:?}: {found:?}");
+            println!("{label}");
+            let Agreement { valid, over_maps, texels } = found;
+            assert!(texels[1] * 1000 <= texels[0] && over_maps * 1000 <= valid[0], "{label}");
+            let reads_many = name == "forest" && matches!(kind, Variant::Pcf | Variant::ObjectId);
+            assert!(reads_many || valid[1] * 1000 <= valid[0], "{label}");
         }
     }
 }

@@ -115,3 +115,17 @@ fn many_views_agree() {
         }
     }
 }
+
+/// The scene's own light, on a small picture; cascades under a sun.
+#[test]
+fn all_agree_on_every_built_in_scene() {
+    let Some(gpu) = testing::gpu() else { return };
+    for name in scenes::all().iter().map(|scene| scene.name) {
+        let mut setup = setup(name);
+        (setup.camera.width, setup.camera.height) = (80, 60);
+        let sun = Light::Directional { direction: Vec3::new(0.4, -1.0, 0.3), angular_radius: 0.0 };
+        let of = |variant| ShadowMapParams { variant, views: 4, map_size: MAP_SIZE, ..Default::default() };
+        check(&gpu, name, &setup, sun, of(Variant::Cascaded));
+        check(&gpu, name, &setup, setup.lights[0], of(Variant::MultiView));
+    }
+}

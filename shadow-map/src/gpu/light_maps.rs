@@ -2,13 +2,18 @@
 
 use std::ops::Range;
 
-use scene_core::gpu::{Bound, DepthIds, DepthLayers, DepthPass, GpuError, GpuScene, HeldBuffer, Recorder};
-use scene_core::{Light, Report, relevance};
+use scene_core::gpu::{
+    Bound, DepthIds, DepthLayers, DepthPass, GpuError, GpuObject, GpuScene, HeldBuffer, Recorder,
+};
+use scene_core::relevance::{self, Receivers};
+use scene_core::{Camera, Light, Report, Scene};
 
 use super::filter_maps::LevelTable;
 use super::layout::{MapsUniform, ViewUniform};
-use crate::light_views::{LightView, light_views};
+use crate::light_views::{LightView, LightViews, light_views};
+use crate::params::HARD_REACH;
 use crate::receiver_plane::plane_tolerance;
+use crate::view_casters::{looked_up_behind, looked_up_in};
 use crate::{ShadowMapParams, Variant};
 
 /// Draws the maps of a light, and keeps their textures and what shaders must know of them.
@@ -28,6 +33,8 @@ pub struct MapsPlan {
     pub views: Vec<LightView>,
     /// Ranges of triangles.
     pub casters: Vec<Range<u32>>,
+    /// Those that each view holds for one camera, where that was asked for.
+    pub of_views: Option<Vec<Vec<Range<u32>>>>,
     /// [`plane_tolerance`].
     pub tolerance: f32,
 }
@@ -57,24 +64,94 @@ impl LightMapsOnGpu {
         }
     }
 
-    /// Chooses the views of `light` and what is drawn into them. Nothing is recorded.
+    /// Chooses the views of `light` and what is drawn into them, for any camera. Nothing is recorded.
     pub fn plan(&self, scene: &GpuScene<'_>, light: &Light, report: &mut Report) -> MapsPlan {
+        self.plan_with(scene, light, None, report)
+    }
+
+    /// As [`plan`](Self::plan); with `view_dependent` and `skip` each view holds only what surfaces that `camera` sees are looked
+    /// up in. A face of a cube that nobody looks at draws nothing.
+    pub fn plan_for_view(
+        &self,
+        scene: &GpuScene<'_>,
+        light: &Light,
+        camera: &Camera,
+        report: &mut Report,
+    ) -> MapsPlan {
+        let ShadowMapParams { skip, view_dependent, .. } = self.params;
+        self.plan_with(scene, light, (skip && view_dependent).then_some(camera), report)
+    }
+
+    fn plan_with(
+        &self,
+        scene: &GpuScene<'_>,
+        light: &Light,
+        camera: Option<&Camera>,
+        report: &mut Report,
+    ) -> MapsPlan {
         let geometry = scene.geometry_or_boxes();
         let tolerance = plane_tolerance(geometry.bounds(), light);
         // A box in the place of an object may be convex where the object is not.
         let has_solids = self.params.variant == Variant::MultiView && scene.geometry.is_some();
         let told_apart = if has_solids { relevance::told_apart_with_solids } else { relevance::told_apart };
         let casters = told_apart(&geometry, light, tolerance);
-        let views = light_views(&geometry, light, &casters.drawn, self.params.skips_faces());
+        let LightViews { views, skipped_faces } =
+            light_views(&geometry, light, &casters.drawn, self.params.skips_faces());
         report.skip("casters", casters.backdrops.len() as u64);
-        report.skip("faces", views.skipped_faces);
+        report.skip("faces", skipped_faces);
         let is_drawn = |id: usize| {
             let object = &geometry.objects()[id];
-            !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
+            object.flags.casts && !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
         };
         let objects = scene.objects.iter().enumerate().filter(|(id, _)| is_drawn(*id));
-        let casters = objects.map(|(_, object)| object.triangles.clone()).collect();
-        MapsPlan { views: views.views, casters, tolerance }
+        let drawn: Vec<_> = objects.map(|(_, object)| object).collect();
+        let of_views = camera.and_then(|camera| {
+            // Of a box nothing is known but that the object lies within.
+            let is_whole = scene.geometry.is_some();
+            let seen_by = if is_whole { Receivers::seen_closely_by } else { Receivers::seen_by };
+            let receivers = seen_by(&geometry, camera, light);
+            self.of_views(&geometry, light, &receivers, &views, &drawn, report)
+        });
+        let casters = drawn.into_iter().map(|object| object.triangles.clone()).collect();
+        MapsPlan { views, casters, of_views, tolerance }
+    }
+
+    /// Of the objects `drawn` those that each view holds for `receivers`, as a whole; `None` where a lookup may read any texel.
+    fn of_views(
+        &self,
+        geometry: &Scene,
+        light: &Light,
+        receivers: &Receivers,
+        views: &[LightView],
+        drawn: &[&GpuObject],
+        report: &mut Report,
+    ) -> Option<Vec<Vec<Range<u32>>>> {
+        let size = self.params.map_size;
+        let reach = reach_of(&self.params, light)?;
+        let of = |view: &LightView| {
+            let is_face = views.len() > 1;
+            let seen = if is_face {
+                receivers.clone().inside(&looked_up_in(view, size, reach)?)
+            } else {
+                receivers.clone()
+            };
+            if reads_whole_maps(self.params.variant) {
+                return Some(if seen.is_empty() { Vec::new() } else { drawn.to_vec() });
+            }
+            let region = looked_up_behind(geometry, light, &seen, &[*view], size, reach);
+            Some(drawn.iter().copied().filter(|object| region.touches(&object.bounds)).collect())
+        };
+        let kept = views.iter().map(of).collect::<Option<Vec<_>>>()?;
+        let triangles =
+            |objects: &[&GpuObject]| objects.iter().map(|o| o.triangles.len() as u64).sum::<u64>();
+        for kept in &kept {
+            report.skip("casters outside view", (drawn.len() - kept.len()) as u64);
+            report.skip("caster triangles outside view", triangles(drawn) - triangles(kept));
+            report.skip("undrawn faces", u64::from(kept.is_empty()));
+        }
+        let ranges =
+            |kept: Vec<&GpuObject>| kept.into_iter().map(|object| object.triangles.clone()).collect();
+        Some(kept.into_iter().map(ranges).collect())
     }
 
     /// Records the drawing of the maps, timed as `stage`. A light without casters has no views, and a map that is not
@@ -92,7 +169,11 @@ impl LightMapsOnGpu {
         let count = plan.views.len() as u32;
         self.layers.resize(recorder.device, self.params.map_size, count)?;
         let projections = plan.views.iter().map(|view| view.projection_from_world);
-        let targets = self.layers.targets(projections, Some(&plan.casters));
+        let mut targets = self.layers.targets(projections, Some(&plan.casters));
+        // What a view does not hold is cleared all the same: layers are kept from frame to frame.
+        for (target, casters) in targets.iter_mut().zip(plan.of_views.iter().flatten()) {
+            target.triangles = Some(casters);
+        }
         self.depth.record(recorder, stage, scene, &targets);
 
         let device = recorder.device;
@@ -108,4 +189,20 @@ impl LightMapsOnGpu {
     pub fn layers(&self) -> &DepthLayers {
         &self.layers
     }
+}
+
+/// How many texels beside a receiver's own its lookup reads at most; `None` if that is not known.
+fn reach_of(params: &ShadowMapParams, light: &Light) -> Option<f64> {
+    match params.variant {
+        Variant::Hard | Variant::Cascaded | Variant::MultiView => Some(HARD_REACH),
+        Variant::Pcf | Variant::ObjectId | Variant::Moments => Some(f64::from(params.filter) * 0.5 + 2.0),
+        // The cone to a light of no extent is a line.
+        Variant::Pcss => (!light.is_extended()).then_some(HARD_REACH),
+        Variant::AliasFree => None,
+    }
+}
+
+/// Whether texels that are not looked up count, too: nearest and farthest depth of a view, its pyramid.
+fn reads_whole_maps(variant: Variant) -> bool {
+    matches!(variant, Variant::Moments | Variant::Pcss)
 }

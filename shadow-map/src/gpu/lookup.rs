@@ -107,7 +107,9 @@ impl VariantOnGpu for Lookup {
         let mut report = Report::default();
         self.prepared = None;
         let device = recorder.device;
-        let plan = report.time("prepare.views", |report| self.maps.plan(&query.scene, query.light, report));
+        let plan = report.time("prepare.views", |report| {
+            self.maps.plan_for_view(&query.scene, query.light, query.camera, report)
+        });
         let drawn = self.maps.draw(recorder, &query.scene, &plan, "prepare.maps")?;
         if let Some(drawn) = drawn {
             let scene = self.scene.groups(device, &query.scene);

@@ -12,8 +12,9 @@
 //! | `shade.maps` | the maps of `cascaded`, and of `multi-view` one after the other, each looked up at once |
 //! | `shade.receivers`, `shade.casters` | the irregular z-buffer of `alias-free` |
 //!
-//! `view_dependent` is not asked here: all casters are drawn, which costs time and changes no pixel. What filters leave out
-//! is not counted: nothing is read back.
+//! With `view_dependent` a map holds the objects that surfaces seen by the query's camera are looked up in, and a face of a
+//! cube that nobody looks at draws nothing. Both are chosen in `prepare.views` by the CPU's bounds of what is seen, so nothing
+//! is read back. What filters leave out is not counted.
 //!
 //! V differs from the CPU's only where the hardware's rasteriser gives a texel on a caster's outline to the other side
 //! of it, or rounding decides: a receiver or tap on the border of two texels, a stored point that rises above a plane by
@@ -46,6 +47,7 @@ use multi_view::MultiView;
 #[derive(Debug)]
 pub struct ShadowMapOnGpu {
     variant: Box<dyn VariantOnGpu>,
+    is_for_one_camera: bool,
 }
 
 /// A variant on one device. Each is a type in the file named after it; this is all that is asked of it.
@@ -91,6 +93,7 @@ impl ShadowMapOnGpu {
             device.limits().max_texture_dimension_2d,
         )?;
         Ok(Self {
+            is_for_one_camera: params.view_dependent,
             variant: match params.variant {
                 Variant::AliasFree => Box::new(AliasFree::new(device, visibility)),
                 Variant::Cascaded => Box::new(Cascaded::new(device, params, visibility)),
@@ -101,8 +104,8 @@ impl ShadowMapOnGpu {
         })
     }
 
-    /// Records what depends on the query's light: the drawing of its maps. They hold for any camera, `view_dependent`
-    /// or not.
+    /// Records what depends on the query's light: the drawing of its maps. They hold for any camera, with `view_dependent` for
+    /// the query's alone.
     ///
     /// Without [`GpuScene::geometry`](scene_core::gpu::GpuScene::geometry) the views are fitted to the bounds of
     /// objects, which takes more texels than the vertices would.
@@ -115,6 +118,11 @@ impl ShadowMapOnGpu {
         query: &GpuShadowQuery<'_>,
     ) -> Result<Report, TechniqueError> {
         self.variant.prepare(recorder, query)
+    }
+
+    /// Whether what was prepared holds for any camera.
+    pub fn survives_camera(&self) -> bool {
+        !self.is_for_one_camera
     }
 
     /// Records the passes that write V of every pixel, 1 where nothing is seen.

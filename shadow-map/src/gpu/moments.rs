@@ -155,7 +155,9 @@ impl VariantOnGpu for Moments {
         let mut report = Report::default();
         self.prepared = None;
         let device = recorder.device;
-        let plan = report.time("prepare.views", |report| self.maps.plan(&query.scene, query.light, report));
+        let plan = report.time("prepare.views", |report| {
+            self.maps.plan_for_view(&query.scene, query.light, query.camera, report)
+        });
         if let Some(drawn) = self.maps.draw(recorder, &query.scene, &plan, "prepare.maps")? {
             let scene = self.scene.groups(device, &query.scene);
             let depths = self.depths.record(recorder, &drawn, &scene.triangles)?;

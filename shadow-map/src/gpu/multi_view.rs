@@ -2,7 +2,7 @@
 //! the points so far.
 //!
 //! Points, their views and casters are chosen in `prepare`, from the scene alone; maps are drawn in `shade`, all into the same
-//! texture. Casters that no receiver needs are drawn, too: which ones those are is not read back.
+//! texture. Casters that no receiver needs are drawn, too, unless maps are `view_dependent`.
 
 use scene_core::gpu::{
     DepthLayers, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings,
@@ -94,7 +94,7 @@ impl VariantOnGpu for MultiView {
             let points = light_points(query.light, query.scene.bounds, views, seed);
             let plan = |point| {
                 let light = query.light.reduced_to(point);
-                (light, self.maps.plan(&query.scene, &light, report))
+                (light, self.maps.plan_for_view(&query.scene, &light, query.camera, report))
             };
             points.into_iter().map(plan).collect()
         });
