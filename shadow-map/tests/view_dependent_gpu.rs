@@ -53,12 +53,11 @@ fn params((variant, kernel): (Variant, Kernel)) -> ShadowMapParams {
 fn no_image_changes() {
     let Some(gpu) = testing::gpu() else { return };
     let mut dark = 0;
-    for spec in ["street", "chess", "forest:triangles=20000"] {
+    for spec in ["street", "forest:triangles=5000"] {
         let setup = scenes::build(spec, 1.0).unwrap();
         let bounds = setup.scene.bounds();
         let lamp = Light::Point { position: bounds.center() + 0.1 * bounds.size() };
-        let sun = Light::Directional { direction: glam::Vec3::new(0.4, -1.0, 0.3), angular_radius: 0.01 };
-        for (seed, light) in [(1, lamp), (2, lamp), (3, lamp), (4, setup.lights[0]), (5, sun)] {
+        for (seed, light) in [(1, lamp), (3, lamp), (5, setup.lights[0])] {
             let camera = random_view(&setup.scene, seed).with_size(64, 48);
             for kind in VARIANTS {
                 let runs = run(&gpu, &setup.scene, &camera, &light, params(kind));
@@ -67,7 +66,7 @@ fn no_image_changes() {
             }
         }
     }
-    assert!(dark > 10_000, "{dark} pixels in shadow");
+    assert!(dark > 5_000, "{dark} pixels in shadow");
 }
 
 /// A lamp in the middle of what a narrow camera sees a part of: faces that look elsewhere draw nothing, and that is counted.
