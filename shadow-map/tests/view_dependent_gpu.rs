@@ -53,7 +53,7 @@ fn params((variant, kernel): (Variant, Kernel)) -> ShadowMapParams {
 fn no_image_changes() {
     let Some(gpu) = testing::gpu() else { return };
     let mut dark = 0;
-    for spec in ["street", "forest:triangles=5000"] {
+    for spec in ["street", "forest:triangles=20000"] {
         let setup = scenes::build(spec, 1.0).unwrap();
         let bounds = setup.scene.bounds();
         let lamp = Light::Point { position: bounds.center() + 0.1 * bounds.size() };
