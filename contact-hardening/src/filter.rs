@@ -47,6 +47,9 @@ struct Layers {
     half: f32,
 }
 
+/// Blockers within so much of a step are one layer: some thousand times what rounding tells apart where a caster is flat.
+const CLOSE: f32 = 1.0 / 1024.0;
+
 impl Layers {
     fn new(which: Blocker, blockers: &Blockers, mean: f32) -> Self {
         let mut layers = Self { t: [mean; MAX_LAYERS], count: 1, half: f32::INFINITY };
@@ -54,15 +57,18 @@ impl Layers {
             Blocker::Average => {}
             Blocker::Minimum => layers.t[0] = blockers.least,
             Blocker::Each => {
-                // A step widens the footprint by at most √2. Half a step to each side leaves no gap between layers; where they are
-                // closer, a blocker must not fall between them by rounding.
+                // A step widens the footprint by at most √2. Half a step to each side leaves no gap between layers; wider
+                // windows would count what another layer's footprint answers for.
                 let ratio = blockers.greatest / blockers.least;
-                layers.count = 1 + (2.0 * ratio.log2()).ceil().min((MAX_LAYERS - 1) as f32) as usize;
+                layers.count =
+                    1 + (2.0 * ratio.log2() - CLOSE).ceil().clamp(0.0, (MAX_LAYERS - 1) as f32) as usize;
                 let last = (layers.count - 1).max(1) as f32;
                 for (index, t) in layers.t[..layers.count].iter_mut().enumerate() {
                     *t = blockers.least * ratio.powf(index as f32 / last);
                 }
-                layers.half = (0.5 * ratio.ln() / last).max(0.25 * std::f32::consts::LN_2);
+                if layers.count > 1 {
+                    layers.half = 0.5 * ratio.ln() / last;
+                }
             }
         }
         layers
@@ -169,7 +175,7 @@ impl Asker<'_> {
             let above = (located.z / t).ln();
             // The search finds some blockers: others may be nearer than the first layer, where they stand in the cone,
             // or beyond the last.
-            let is_within = (above >= -half || is_first && self.physical.covers(self.site, located))
+            let is_within = (above >= -half || is_first && self.site.cone.contains(located))
                 && (above <= half || is_last);
             state.blocked = is_within || above * state.before < 0.0;
             state.before = above;
