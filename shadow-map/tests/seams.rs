@@ -129,6 +129,23 @@ fn share_of_window(half_plane: &HalfPlane, point: Vec3, map_size: u32, is_round:
     lit / all
 }
 
+/// Holds V against `expected` for every half plane, and prints the largest difference.
+fn compare_all(
+    light: Light,
+    params: ShadowMapParams,
+    expected: impl Fn(&HalfPlane, Vec3) -> f32 + Copy,
+    bound: f32,
+) {
+    let worst = HalfPlane::all().map(|plane| plane.compare(light, params, expected, bound));
+    println!("{} of {bound}", worst.fold(0.0, f32::max));
+}
+
+/// The same against shares of windows.
+fn compare_windows(light: Light, params: ShadowMapParams, is_round: bool, bound: f32) {
+    let expected = |plane: &HalfPlane, point| share_of_window(plane, point, params.map_size, is_round);
+    compare_all(light, params, expected, bound);
+}
+
 fn point_light(variant: Variant) -> (Light, ShadowMapParams) {
     let params = ShadowMapParams { variant, map_size: 512, filter: FILTER, taps: TAPS, ..Default::default() };
     (Light::Point { position: LAMP }, params)
@@ -147,17 +164,13 @@ const OFFSET: f32 = 0.5 * SQRT_2 + 1.118;
 #[test]
 fn pcf_goes_on_into_other_faces() {
     let (light, params) = point_light(Variant::Pcf);
-    let expected = |plane: &HalfPlane, point| share_of_window(plane, point, params.map_size, false);
-    let worst = HalfPlane::all().map(|plane| plane.compare(light, params, expected, WINDOW_BOUND));
-    println!("{} of {WINDOW_BOUND}", worst.fold(0.0, f32::max));
+    compare_windows(light, params, false, WINDOW_BOUND);
 }
 
 #[test]
 fn object_ids_go_on_into_other_faces() {
     let (light, params) = point_light(Variant::ObjectId);
-    let expected = |plane: &HalfPlane, point| share_of_window(plane, point, params.map_size, false);
-    let worst = HalfPlane::all().map(|plane| plane.compare(light, params, expected, WINDOW_BOUND));
-    println!("{} of {WINDOW_BOUND}", worst.fold(0.0, f32::max));
+    compare_windows(light, params, false, WINDOW_BOUND);
 }
 
 /// A texel's centre is up to half a diagonal from the place that is asked, and in another face by up to √5/2 more (see
@@ -167,9 +180,7 @@ fn poisson_disks_go_on_into_other_faces() {
     let (light, params) = point_light(Variant::Pcf);
     let params = ShadowMapParams { kernel: Kernel::PoissonDisk, ..params };
     let bound = 4.0 / PI * OFFSET / FILTER as f32 + 1.0 / (TAPS as f32).sqrt();
-    let expected = |plane: &HalfPlane, point| share_of_window(plane, point, params.map_size, true);
-    let worst = HalfPlane::all().map(|plane| plane.compare(light, params, expected, bound));
-    println!("{} of {bound}", worst.fold(0.0, f32::max));
+    compare_windows(light, params, true, bound);
 }
 
 /// In the window are one surface and nothing: what four moments tell apart. Their bias moves V by 2⁻⁸, and from a face that sees the
@@ -179,9 +190,7 @@ fn moments_go_on_into_other_faces() {
     let (light, params) = point_light(Variant::Moments);
     let params = ShadowMapParams { light_bleeding: 0.0, ..params };
     let bound = WINDOW_BOUND + 2.0 / 256.0;
-    let expected = |plane: &HalfPlane, point| share_of_window(plane, point, params.map_size, false);
-    let worst = HalfPlane::all().map(|plane| plane.compare(light, params, expected, bound));
-    println!("{} of {bound}", worst.fold(0.0, f32::max));
+    compare_windows(light, params, false, bound);
 }
 
 /// V is the share of a sphere's disk beside the half plane's edge.
@@ -208,6 +217,5 @@ fn pcss_goes_on_into_other_faces() {
         let u = u.clamp(-1.0, 1.0);
         0.5 + (u * (1.0 - u * u).sqrt() + u.asin()) / PI
     };
-    let worst = HalfPlane::all().map(|plane| plane.compare(light, params, expected, bound));
-    println!("{} of {bound}", worst.fold(0.0, f32::max));
+    compare_all(light, params, expected, bound);
 }
