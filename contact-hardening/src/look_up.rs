@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3, Vec3A};
 use gnomon_shadow_map::filter_maps::FilterMaps;
 use gnomon_shadow_map::light_cone::LightCone;
 use gnomon_shadow_map::light_maps::{LightMaps, Occluder, Receiver, ShadowMapView};
-use gnomon_shadow_map::receiver_plane::{meets, rises_above};
+use gnomon_shadow_map::receiver_plane::{NearSurface, meets, rises_above};
 use gnomon_shadow_map::texel_plane::TexelPlane;
 use rayon::prelude::*;
 use scene_core::light::LightPoint;
@@ -124,7 +124,7 @@ impl<'a> LookUps<'a> {
         });
         let center = self.maps().light.center();
         let parallel = matches!(center, LightPoint::Towards(_));
-        let near = NearSurface::new(receiver, center);
+        let near = NearSurface::new(receiver.point, receiver.normal, center);
         Lines { look_ups: self, receiver: *receiver, cone: *cone, near, parallel, face }
     }
 }
@@ -149,28 +149,6 @@ pub struct Texel {
 
 impl Texel {
     const ELSEWHERE: Self = Self { column: 0, row: 0, depth: f32::NAN };
-}
-
-/// Question 3 of shadow-map's `receiver_plane` for one receiver: see [`is_near`](gnomon_shadow_map::receiver_plane::is_near).
-#[derive(Clone, Copy, Debug)]
-struct NearSurface {
-    to_light: Vec3,
-    /// 1 + tan θ of the receiver's slope against the light.
-    slope: f32,
-}
-
-impl NearSurface {
-    fn new(receiver: &Receiver, center: LightPoint) -> Self {
-        let (to_light, _) = center.ray_from(receiver.point);
-        let to_light = to_light.normalize_or_zero();
-        let cos = receiver.normal.dot(to_light).max(f32::MIN_POSITIVE);
-        Self { to_light, slope: 1.0 + (1.0 - cos * cos).max(0.0).sqrt() / cos }
-    }
-
-    #[inline]
-    fn holds(&self, from_receiver: Vec3, texel: f32) -> bool {
-        from_receiver.dot(self.to_light) <= texel * self.slope
-    }
 }
 
 /// The lines from one receiver to the points of the light.
@@ -300,7 +278,11 @@ impl Lines<'_, '_> {
             Some(face) if !texel.depth.is_nan() => {
                 let rises = texel.depth > 0.0
                     && face.plane.rise(texel.column as f32, texel.row as f32, texel.depth) > 0.0;
-                if rises { self.ask(&occluder(face, texel), at) } else { Met::Nothing }
+                if !rises {
+                    return Met::Nothing;
+                }
+                let place = [texel.column as usize, texel.row as usize];
+                self.ask(&face.map.occluder(place, texel.depth), at)
             }
             _ => self.meet_elsewhere(at, t),
         }
@@ -329,18 +311,5 @@ impl Lines<'_, '_> {
         let blocks = !self.near.holds(stored.point - point, stored.texel)
             || meets(maps.scene.corners(stored.triangle), point, line());
         if blocks { Met::Blocker(located) } else { Met::Nothing }
-    }
-}
-
-/// What a texel of a face holds.
-#[inline]
-fn occluder(face: &Face<'_>, texel: &Texel) -> Occluder {
-    let ShadowMapView { view, triangles, .. } = face.map;
-    let wide = 2.0 / face.size as f32;
-    let center = Vec2::new(texel.column as f32 + 0.5, texel.row as f32 + 0.5) * wide;
-    Occluder {
-        point: view.unproject(Vec2::new(center.x - 1.0, 1.0 - center.y), texel.depth),
-        triangle: triangles[texel.row as usize * face.size as usize + texel.column as usize] as usize,
-        texel: view.half_diagonal(texel.depth) * wide,
     }
 }

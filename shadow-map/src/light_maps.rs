@@ -58,6 +58,18 @@ impl ShadowMapView {
             && (rows.start as usize..rows.end as usize).contains(&row)
     }
 
+    /// The surface stored in a texel (column and row) at `depth`, which is not 0.
+    #[inline]
+    pub fn occluder(&self, [column, row]: [usize; 2], depth: f32) -> Occluder {
+        let texel = 2.0 / self.map.width as f32;
+        let center = Vec2::new(column as f32 + 0.5, row as f32 + 0.5) * texel;
+        Occluder {
+            point: self.view.unproject(Vec2::new(center.x - 1.0, 1.0 - center.y), depth),
+            triangle: self.triangles[row * self.map.width as usize + column] as usize,
+            texel: self.view.half_diagonal(depth) * texel,
+        }
+    }
+
     /// Normalised device coordinates in texels: column and row, a texel's centre at one half; beside the map, too.
     #[inline]
     pub(crate) fn texel_at(&self, ndc: Vec2) -> Vec2 {
@@ -201,16 +213,11 @@ impl<'a> LightMaps<'a> {
     #[inline]
     pub fn occluder(&self, receiver: Vec3) -> Option<Occluder> {
         let (map, ndc) = self.maps.iter().find_map(|m| m.view.project(receiver).map(|ndc| (m, ndc)))?;
-        let (size, count) = (map.map.width as f32, map.map.width as usize);
         let [column, row] = map.texel(ndc);
         // For one view only a part is drawn.
-        let depth = if map.holds(column, row) { map.map.depth[row * count + column] } else { 0.0 };
-        let center = Vec2::new(column as f32 + 0.5, row as f32 + 0.5) * (2.0 / size);
-        (depth > 0.0).then(|| Occluder {
-            point: map.view.unproject(Vec2::new(center.x - 1.0, 1.0 - center.y), depth),
-            triangle: map.triangles[row * count + column] as usize,
-            texel: map.view.half_diagonal(depth) * (2.0 / size),
-        })
+        let depth =
+            if map.holds(column, row) { map.map.depth[row * map.map.width as usize + column] } else { 0.0 };
+        (depth > 0.0).then(|| map.occluder([column, row], depth))
     }
 
     /// Whether one of the triangles that the light sees around the receiver's texel crosses the receiver's own ray.

@@ -79,17 +79,38 @@ pub fn is_behind(corners: [Vec3; 3], receiver: Vec3, light: LightPoint, toleranc
         && if side > 0.0 { -height > tolerance * length } else { side < 0.0 && height > tolerance * length }
 }
 
-/// Question 3: whether `stored` may be a neighbour of `receiver` on one surface: nearer along the light's ray
-/// than a surface rises within a texel of diagonal `texel`. The receiver's own slope against the light is
-/// tan θ; its neighbours are given twice that and, where the receiver faces the light, twice 45°, over the half
-/// diagonal that lies between a receiver and its texel's centre: `texel`·(1 + tan θ).
+/// Question 3 for one receiver: what may be a neighbour of it on one surface, being nearer along the light's ray than a surface
+/// rises within a texel. The receiver's own slope against the light is tan θ; its neighbours are given twice that and, where the
+/// receiver faces the light, twice 45°, over the half diagonal that lies between a receiver and its texel's centre: a diagonal times
+/// 1 + tan θ.
+#[derive(Clone, Copy, Debug)]
+pub struct NearSurface {
+    to_light: Vec3,
+    /// 1 + tan θ.
+    slope: f32,
+}
+
+impl NearSurface {
+    /// Around `receiver` with the unit `normal`, for a light at, or towards, `light`.
+    #[inline]
+    pub fn new(receiver: Vec3, normal: Vec3, light: LightPoint) -> Self {
+        let (to_light, _) = light.ray_from(receiver);
+        let to_light = to_light.normalize_or_zero();
+        let cos = normal.dot(to_light).max(f32::MIN_POSITIVE);
+        Self { to_light, slope: 1.0 + (1.0 - cos * cos).max(0.0).sqrt() / cos }
+    }
+
+    /// Whether it may hold what is stored so far `from_receiver` in a texel of diagonal `texel`.
+    #[inline]
+    pub fn holds(&self, from_receiver: Vec3, texel: f32) -> bool {
+        from_receiver.dot(self.to_light) <= texel * self.slope
+    }
+}
+
+/// [`NearSurface`] for one question: whether it holds `stored`, in a texel of diagonal `texel`.
 #[inline]
 pub fn is_near(stored: Vec3, receiver: Vec3, normal: Vec3, light: LightPoint, texel: f32) -> bool {
-    let (to_light, _) = light.ray_from(receiver);
-    let to_light = to_light.normalize_or_zero();
-    let cos = normal.dot(to_light).max(f32::MIN_POSITIVE);
-    let tan = (1.0 - cos * cos).max(0.0).sqrt() / cos;
-    (stored - receiver).dot(to_light) <= texel * (1.0 + tan)
+    NearSurface::new(receiver, normal, light).holds(stored - receiver, texel)
 }
 
 /// Whether the line from `point` towards the light passes between the corners, by the signs of the volumes it
