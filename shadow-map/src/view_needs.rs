@@ -20,21 +20,25 @@ pub(crate) enum Reach {
 }
 
 impl Reach {
-    /// `None` for variants that choose what they draw while they shade.
-    pub(crate) fn of(params: &ShadowMapParams, light: &Light) -> Option<Self> {
-        let has_extent = match *light {
-            Light::Directional { angular_radius, .. } => angular_radius > 0.0,
-            Light::Point { .. } | Light::Spot { .. } => false,
-            _ => true,
-        };
+    /// Of one lookup. `None` where the variant has none.
+    pub(crate) fn of_lookup(params: &ShadowMapParams, light: &Light) -> Option<Self> {
         match params.variant {
-            Variant::Pcss if has_extent => Some(Self::Cone),
-            Variant::Hard | Variant::Pcss => Some(Self::Texels(HARD_REACH)),
+            Variant::Pcss if light.is_extended() => Some(Self::Cone),
+            // The cone to a light of no extent is a line.
+            Variant::Hard | Variant::Pcss | Variant::Cascaded | Variant::MultiView => {
+                Some(Self::Texels(HARD_REACH))
+            }
             Variant::Pcf | Variant::ObjectId | Variant::Moments => {
                 Some(Self::Texels(f64::from(params.filter) * 0.5 + 2.0))
             }
-            Variant::Cascaded | Variant::MultiView | Variant::AliasFree => None,
+            Variant::AliasFree => None,
         }
+    }
+
+    /// What prepared maps are looked up in. `None` for variants that choose what they draw while they shade, too.
+    pub(crate) fn of(params: &ShadowMapParams, light: &Light) -> Option<Self> {
+        let draws_while_shading = matches!(params.variant, Variant::Cascaded | Variant::MultiView);
+        Self::of_lookup(params, light).filter(|_| !draws_while_shading)
     }
 }
 

@@ -11,9 +11,9 @@ use scene_core::{Camera, Light, Report, Scene};
 use super::filter_maps::LevelTable;
 use super::layout::{MapsUniform, ViewUniform};
 use crate::light_views::{LightView, LightViews, light_views};
-use crate::params::HARD_REACH;
 use crate::receiver_plane::plane_tolerance;
 use crate::view_casters::{looked_up_behind, looked_up_in};
+use crate::view_needs::Reach;
 use crate::{ShadowMapParams, Variant};
 
 /// Draws the maps of a light, and keeps their textures and what shaders must know of them.
@@ -127,7 +127,7 @@ impl LightMapsOnGpu {
         report: &mut Report,
     ) -> Option<Vec<Vec<Range<u32>>>> {
         let size = self.params.map_size;
-        let reach = reach_of(&self.params, light)?;
+        let Some(Reach::Texels(reach)) = Reach::of_lookup(&self.params, light) else { return None };
         let of = |view: &LightView| {
             let is_face = views.len() > 1;
             let seen = if is_face {
@@ -188,17 +188,6 @@ impl LightMapsOnGpu {
     /// The maps, one a layer, and the triangles they see.
     pub fn layers(&self) -> &DepthLayers {
         &self.layers
-    }
-}
-
-/// How many texels beside a receiver's own its lookup reads at most; `None` if that is not known.
-fn reach_of(params: &ShadowMapParams, light: &Light) -> Option<f64> {
-    match params.variant {
-        Variant::Hard | Variant::Cascaded | Variant::MultiView => Some(HARD_REACH),
-        Variant::Pcf | Variant::ObjectId | Variant::Moments => Some(f64::from(params.filter) * 0.5 + 2.0),
-        // The cone to a light of no extent is a line.
-        Variant::Pcss => (!light.is_extended()).then_some(HARD_REACH),
-        Variant::AliasFree => None,
     }
 }
 
