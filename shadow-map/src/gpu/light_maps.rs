@@ -191,7 +191,7 @@ impl LightMapsOnGpu {
     }
 }
 
-/// Whether texels that are not looked up count, too: nearest and farthest depth of a view, its pyramid.
+/// Whether texels that are not looked up count, too: those of its pyramid.
 fn reads_whole_maps(variant: Variant) -> bool {
-    matches!(variant, Variant::Moments | Variant::Pcss)
+    variant == Variant::Pcss
 }
