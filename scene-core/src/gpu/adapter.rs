@@ -129,6 +129,8 @@ impl Gpu {
                 fault.get_or_insert_with(|| GpuError::from_wgpu(what, &error));
             }
         }
+        // What is made on a lost device is invalid, often without a word; the loss itself is told when the device is polled.
+        let _ = self.device.poll(wgpu::PollType::Poll);
         self.check()?;
         fault.map_or(Ok(result), Err)
     }

@@ -1,6 +1,6 @@
 //! Compute passes: a pipeline an entry point, recorded as one pass a dispatch.
 
-use super::pipeline::shader_module;
+use super::pipeline::{count_pipeline, shader_module};
 use super::{GpuError, Recorder, binding_limit};
 
 /// One entry point of a compute shader.
@@ -24,6 +24,7 @@ impl ComputePass {
             bind_group_layouts: groups,
             immediate_size: 0,
         });
+        count_pipeline();
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(label),
             layout: Some(&layout),

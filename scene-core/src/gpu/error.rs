@@ -42,14 +42,18 @@ pub enum GpuError {
         /// What was being made.
         what: String,
     },
-    /// A resource is larger than the adapter allows.
-    #[error("{what} need {bytes} bytes, but this adapter binds at most {limit} in one piece")]
+    /// A resource is larger than the device allows. [`Gpu`](super::Gpu) asks for all that its adapter offers; a renderer's own
+    /// device has WebGPU's 128 MiB unless more was asked for, as `max_storage_buffer_binding_size` and `max_buffer_size`.
+    #[error(
+        "{what} need {bytes} bytes, but this device binds at most {limit} in one piece: take fewer triangles, smaller or fewer \
+         maps, or a smaller image, whichever these are, an adapter that binds more (GNOMON_ADAPTER), or the CPU (--backend cpu)"
+    )]
     TooLarge {
         /// What.
         what: &'static str,
         /// Its size.
         bytes: u64,
-        /// The adapter's limit.
+        /// The device's limit.
         limit: u64,
     },
     /// More of something than the device has.

@@ -61,6 +61,8 @@ pub struct HeadlessView<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
     buffers: SceneBuffers,
+    /// Made when it is first drawn.
+    pass: Option<GBufferPass>,
     targets: GBufferTargets,
     visibility: wgpu::Texture,
     timer: Option<StageTimer>,
@@ -96,7 +98,7 @@ impl Gpu {
             self.scoped("the G-buffer", || GBufferTargets::new(&self.device, camera.width, camera.height))?;
         let visibility = self.scoped("the visibility texture", || self.visibility_texture(&targets))?;
         let timer = StageTimer::new(&self.device, &self.queue, TIMED_PASSES);
-        Ok(HeadlessView { gpu: self, scene, camera, buffers, targets, visibility, timer })
+        Ok(HeadlessView { gpu: self, scene, camera, buffers, pass: None, targets, visibility, timer })
     }
 
     fn visibility_texture(&self, targets: &GBufferTargets) -> wgpu::Texture {
@@ -121,10 +123,11 @@ impl HeadlessView<'_> {
     /// # Errors
     /// What the device objects to.
     pub fn draw_gbuffer(&mut self) -> Result<(GBuffer, Report), HeadlessError> {
-        let Self { gpu, scene, camera, buffers, targets, timer, .. } = self;
+        let Self { gpu, scene, camera, buffers, pass, targets, timer, .. } = self;
         let (report, _) = gpu.step(timer, "gbuffer", |recorder| {
             let scene = buffers.view(Some(scene));
-            GBufferPass::new(&gpu.device).record(recorder, "gbuffer", &scene, camera, targets);
+            pass.get_or_insert_with(|| GBufferPass::new(&gpu.device))
+                .record(recorder, "gbuffer", &scene, camera, targets);
             Ok(Report::default())
         })?;
         Ok((gpu.read_gbuffer(targets, camera)?, report))
@@ -160,7 +163,7 @@ impl HeadlessView<'_> {
         light: &Light,
         gbuffer: &GBuffer,
     ) -> Result<HeadlessRun, HeadlessError> {
-        let Self { gpu, scene, camera, buffers, targets, visibility, timer } = self;
+        let Self { gpu, scene, camera, buffers, targets, visibility, timer, .. } = self;
         let query = GpuShadowQuery { scene: buffers.view(Some(scene)), light, camera };
         let (mut report, prepare_ms) =
             gpu.step(timer, "prepare.wall", |recorder| technique.prepare(recorder, &query))?;

@@ -2,7 +2,8 @@
 //!
 //! Nothing is overwritten in place: a frame that was recorded but not yet submitted keeps what it was recorded with.
 
-use wgpu::util::DeviceExt as _;
+use super::pipeline::count_layout;
+use super::storage::filled_buffer;
 
 /// A small buffer of what the CPU knows: uniforms, tables of views or lights.
 #[derive(Debug)]
@@ -29,11 +30,8 @@ impl HeldBuffer {
         if let Some((_, buffer)) = self.held.as_ref().filter(|(held, _)| held == contents) {
             return buffer.clone();
         }
-        let buffer = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(self.label),
-            contents: if contents.is_empty() { &[0; 256] } else { contents },
-            usage: self.usage,
-        });
+        let bytes = if contents.is_empty() { &[0; 256] } else { contents };
+        let buffer = filled_buffer(device, self.label, bytes, self.usage);
         self.held = Some((contents.to_vec(), buffer.clone()));
         buffer
     }
@@ -151,6 +149,7 @@ impl HeldGroup {
             count: None,
         };
         let entries: Vec<_> = (0..).zip(types).map(entry).collect();
+        count_layout();
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some(label),
             entries: &entries,

@@ -65,7 +65,7 @@ pub use layers::DepthLayers;
 pub use layout::{CameraUniform, DepthUniform, LightUniform};
 pub use receivers::Receivers;
 pub use scene::{GpuCutouts, GpuObject, GpuScene, SceneBindings, SceneBuffers, SceneGroups, SceneHandles};
-pub use storage::{binding_limit, storage_buffer};
+pub use storage::{binding_limit, filled_buffer, storage_buffer};
 pub use technique::{GpuShadowQuery, GpuShadowTechnique};
 pub use timing::{Recorder, StageSpan, StageTimer};
 pub use visibility::{VisibilityPass, VisibilityPassParts};

@@ -1,4 +1,28 @@
-//! Pipelines in the few shapes that the passes here need.
+//! Pipelines in the few shapes that the passes here need, and how many were made.
+
+use std::cell::Cell;
+
+thread_local! {
+    /// Pipelines, layouts of bind groups.
+    static MADE: Cell<[u64; 2]> = const { Cell::new([0; 2]) };
+}
+
+/// Books a pipeline, beside each call that makes one, so that tests can ask whether frames reuse them.
+pub(super) fn count_pipeline() {
+    let [pipelines, layouts] = MADE.get();
+    MADE.set([pipelines + 1, layouts]);
+}
+
+/// Books a layout of bind groups, likewise.
+pub(super) fn count_layout() {
+    let [pipelines, layouts] = MADE.get();
+    MADE.set([pipelines, layouts + 1]);
+}
+
+/// Pipelines and layouts made on this thread.
+pub(super) fn made() -> [u64; 2] {
+    MADE.get()
+}
 
 /// A shader module from linked WGSL.
 pub(super) fn shader_module(device: &wgpu::Device, label: &str, wgsl: &str) -> wgpu::ShaderModule {
@@ -32,6 +56,7 @@ pub(super) fn render_pipeline(
         immediate_size: 0,
     });
     let targets: Vec<_> = parts.targets.iter().map(|&format| Some(format.into())).collect();
+    count_pipeline();
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(parts.label),
         layout: Some(&layout),

@@ -6,6 +6,7 @@ use std::ops::Range;
 use glam::Affine3A;
 
 use super::GpuError;
+use super::pipeline::count_layout;
 use super::storage::storage_buffer_for;
 use crate::geometry::{Aabb, AlphaMask, ObjectFlags, Wrap};
 use crate::{Scene, TriangleMesh};
@@ -243,6 +244,7 @@ impl SceneBindings {
                 },
                 count: None,
             };
+            count_layout();
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
                 label: Some(label),
                 entries: &[entry(0), entry(1)],

@@ -1,7 +1,5 @@
 //! Storage buffers of what the CPU has made, no larger than the device binds in one piece.
 
-use wgpu::util::DeviceExt as _;
-
 use super::GpuError;
 
 /// Bytes that the device binds in one piece.
@@ -38,9 +36,31 @@ pub(super) fn storage_buffer_for(
     if bytes > limit {
         return Err(GpuError::TooLarge { what, bytes, limit });
     }
-    Ok(device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some(what),
-        contents,
-        usage: usage | wgpu::BufferUsages::STORAGE,
-    }))
+    Ok(filled_buffer(device, what, contents, usage | wgpu::BufferUsages::STORAGE))
+}
+
+/// A buffer that holds `contents`, of 4 bytes at least, and zeros up to a multiple of 4.
+///
+/// wgpu's own `create_buffer_init` panics where the device is lost or its memory has run out. Here the buffer is then an invalid
+/// one, as all that is made there, and the device tells why: to an error scope, or to the callback for its loss.
+pub fn filled_buffer(
+    device: &wgpu::Device,
+    label: &str,
+    contents: &[u8],
+    usage: wgpu::BufferUsages,
+) -> wgpu::Buffer {
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size: (contents.len() as u64)
+            .next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT)
+            .max(wgpu::COPY_BUFFER_ALIGNMENT),
+        usage,
+        mapped_at_creation: true,
+    });
+    if let Ok(mut mapped) = buffer.get_mapped_range_mut(..) {
+        mapped.slice(..contents.len()).copy_from_slice(contents);
+        drop(mapped);
+        buffer.unmap();
+    }
+    buffer
 }

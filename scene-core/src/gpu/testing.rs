@@ -3,10 +3,16 @@
 
 use bytemuck::Pod;
 use wgpu::naga;
-use wgpu::util::DeviceExt as _;
 
-use super::pipeline::shader_module;
+use super::pipeline::{made, shader_module};
+use super::storage::filled_buffer;
 use super::{Gpu, GpuError};
+
+/// Pipelines and layouts of bind groups that this thread has made so far by the parts of [`gpu`](super): what a frame adds is
+/// what it did not reuse.
+pub fn pipelines_and_layouts_made() -> [u64; 2] {
+    made()
+}
 
 /// The device of a test. `None`, and a word on standard error, only where `GNOMON_GPU=off` asks for that.
 ///
@@ -44,11 +50,8 @@ pub fn run_kernel<I: Pod, O: Pod>(gpu: &Gpu, wgsl: &str, inputs: &[I]) -> Result
             compilation_options: Default::default(),
             cache: None,
         });
-        let input = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("inputs"),
-            contents: bytemuck::cast_slice(inputs),
-            usage: wgpu::BufferUsages::STORAGE,
-        });
+        let input =
+            filled_buffer(&gpu.device, "inputs", bytemuck::cast_slice(inputs), wgpu::BufferUsages::STORAGE);
         let outputs = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("outputs"),
             size: (inputs.len() * size_of::<O>()) as u64,

@@ -1,6 +1,6 @@
 //! A pass over all pixels that writes V: what `shade` of most techniques comes down to.
 
-use super::pipeline::shader_module;
+use super::pipeline::{count_pipeline, shader_module};
 use super::scene::SceneGroups;
 use super::{Receivers, Recorder, SceneBindings};
 
@@ -48,6 +48,7 @@ impl VisibilityPass {
             ],
             immediate_size: 0,
         });
+        count_pipeline();
         let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(parts.label),
             layout: Some(&layout),

@@ -1,7 +1,7 @@
 //! Faults of devices are errors, not panics.
 
 use gnomon_scene_core::Scene;
-use gnomon_scene_core::gpu::{Gpu, GpuError, SceneBuffers, testing};
+use gnomon_scene_core::gpu::{Gpu, GpuError, SceneBuffers, filled_buffer, storage_buffer, testing};
 
 fn texture(gpu: &Gpu, side: u32, layers: u32) -> Result<wgpu::Texture, GpuError> {
     gpu.scoped("a texture", || {
@@ -91,5 +91,49 @@ fn an_array_too_large_to_bind_is_refused_before_it_is_made() {
     scene.add(&mesh, glam::Affine3A::IDENTITY, Default::default()).unwrap();
     let error = SceneBuffers::new(&device, &scene).unwrap_err();
     assert_eq!(error, GpuError::TooLarge { what: "triangles", bytes: 4800, limit: 4096 });
+    let text = error.to_string();
+    for word in ["triangles need 4800 bytes", "4096", "fewer triangles", "GNOMON_ADAPTER", "--backend cpu"] {
+        assert!(text.contains(word), "{text}");
+    }
     assert!(SceneBuffers::new(&gpu.device, &scene).is_ok());
+}
+
+/// Ten million triangles and more are a matter of the adapter, not of what is asked of it.
+#[test]
+fn a_device_binds_all_that_its_adapter_offers() {
+    let Some(gpu) = testing::gpu() else { return };
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+    let adapter = adapters.iter().find(|a| a.get_info() == gpu.adapter).unwrap();
+    let (has, offered) = (gpu.device.limits(), adapter.limits());
+    assert_eq!(has.max_storage_buffer_binding_size, offered.max_storage_buffer_binding_size);
+    assert_eq!(has.max_buffer_size, offered.max_buffer_size);
+}
+
+#[test]
+fn buffers_are_filled_whatever_their_length() {
+    let Some(gpu) = testing::gpu() else { return };
+    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+    for (bytes, read) in [(&[][..], &[0; 4][..]), (&[1, 2, 3], &[1, 2, 3, 0]), (&[9; 8], &[9; 8])] {
+        let buffer = filled_buffer(&gpu.device, "test", bytes, usage);
+        assert_eq!(gpu.read_buffer::<u8>(&buffer).unwrap(), read);
+    }
+}
+
+/// wgpu's own way to fill a buffer panics here.
+#[test]
+fn uploads_to_a_lost_device_are_errors() {
+    let Some(gpu) = testing::gpu() else { return };
+    let setup = gnomon_scene_core::scenes::build("ball", 0.0).unwrap();
+    let mut view = gpu.view(&setup.scene, &setup.camera).unwrap();
+    gpu.device.destroy();
+    let is_lost = |error: &GpuError| matches!(error, GpuError::Lost { .. });
+    let error = gpu.scoped("a buffer", || storage_buffer(&gpu.device, "test", &[1; 16])).unwrap_err();
+    assert!(is_lost(&error), "{error}");
+    let error = gpu.view(&setup.scene, &setup.camera).unwrap_err();
+    assert!(is_lost(&error), "{error}");
+    let error = view.draw_gbuffer().unwrap_err().to_string();
+    assert!(error.contains("lost"), "{error}");
+    let buffer = filled_buffer(&gpu.device, "test", &[1; 16], wgpu::BufferUsages::COPY_SRC);
+    assert!(is_lost(&gpu.read_buffer::<u32>(&buffer).unwrap_err()));
 }

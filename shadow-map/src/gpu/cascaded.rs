@@ -36,7 +36,6 @@ const PROJECTION_STRIDE: u64 = 256;
 #[derive(Debug)]
 pub(super) struct Cascaded {
     params: ShadowMapParams,
-    format: wgpu::TextureFormat,
     depth: DepthPass,
     layers: DepthLayers,
     fit: HeldBuffer,
@@ -52,8 +51,10 @@ pub(super) struct Cascaded {
     scene: SceneBindings,
     receivers: Receivers,
     prepared: Option<Prepared>,
-    /// Lights at a place have no cascades.
-    hard: Option<Lookup>,
+    /// Lights at a place have no cascades. Made with the rest: a frame whose light is of the other kind makes no pipelines.
+    hard: Lookup,
+    /// Whether that is what was prepared last.
+    is_hard: bool,
 }
 
 /// What `prepare` leaves to `shade`, for a directional light.
@@ -104,7 +105,6 @@ impl Cascaded {
         );
         Self {
             params,
-            format: visibility,
             depth: DepthPass::new(device, DepthIds::Triangle, None),
             layers: DepthLayers::new(DepthIds::Triangle),
             fit: HeldBuffer::uniform("fit of cascades"),
@@ -119,12 +119,18 @@ impl Cascaded {
             scene,
             receivers,
             prepared: None,
-            hard: None,
+            hard: Lookup::new(device, ShadowMapParams { variant: Variant::Hard, ..params }, visibility),
+            is_hard: false,
         }
     }
 
     fn count(&self) -> u32 {
         self.params.cascades.clamp(1, MAX_CASCADES as u32)
+    }
+
+    /// Maps of either kind of light are kept while the other one's are in use.
+    fn bytes(&self) -> u64 {
+        self.layers.bytes() + self.hard.bytes()
     }
 }
 
@@ -135,13 +141,13 @@ impl VariantOnGpu for Cascaded {
         query: &GpuShadowQuery<'_>,
     ) -> Result<Report, TechniqueError> {
         let device = recorder.device;
-        let LightPoint::Towards(to_light) = query.light.center() else {
-            let hard = ShadowMapParams { variant: Variant::Hard, ..self.params };
-            let lookup = self.hard.get_or_insert_with(|| Lookup::new(device, hard, self.format));
+        let center = query.light.center();
+        self.is_hard = matches!(center, LightPoint::At(_));
+        let LightPoint::Towards(to_light) = center else {
             self.prepared = None;
-            return lookup.prepare(recorder, query);
+            let report = self.hard.prepare(recorder, query)?;
+            return Ok(Report { bytes: self.bytes(), ..report });
         };
-        self.hard = None;
         let mut report = Report::default();
         let geometry = query.scene.geometry_or_boxes();
         let tolerance = plane_tolerance(geometry.bounds(), query.light);
@@ -188,8 +194,9 @@ impl VariantOnGpu for Cascaded {
         gbuffer: &GpuGBuffer<'_>,
         visibility: &wgpu::TextureView,
     ) -> Result<Report, TechniqueError> {
-        if let Some(hard) = &mut self.hard {
-            return hard.shade(recorder, camera, gbuffer, visibility);
+        if self.is_hard {
+            let report = self.hard.shade(recorder, camera, gbuffer, visibility)?;
+            return Ok(Report { bytes: self.bytes(), ..report });
         }
         let count = self.count();
         let device = recorder.device;
@@ -225,10 +232,10 @@ impl VariantOnGpu for Cascaded {
         let own = self.own.get(device, &[prepared.maps.clone().into(), views.into(), ids, state.into()]);
         let groups = self.scene.groups(device, &scene);
         self.pass.record(recorder, "shade.lookup", &own, &groups, &receivers, visibility);
-        Ok(Report { bytes: self.layers.bytes(), ..Default::default() })
+        Ok(Report { bytes: self.bytes(), ..Default::default() })
     }
 
     fn layers(&self) -> &DepthLayers {
-        self.hard.as_ref().map_or(&self.layers, |hard| hard.layers())
+        if self.is_hard { self.hard.layers() } else { &self.layers }
     }
 }

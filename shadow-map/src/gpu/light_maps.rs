@@ -5,11 +5,12 @@ use std::ops::Range;
 use scene_core::gpu::{
     Bound, DepthIds, DepthLayers, DepthPass, GpuError, GpuObject, GpuScene, HeldBuffer, Recorder,
 };
-use scene_core::relevance::{self, Receivers};
+use scene_core::relevance::{self, CasterRegion, Receivers};
 use scene_core::{Camera, Light, Report, Scene};
 
 use super::filter_maps::LevelTable;
 use super::layout::{MapsUniform, ViewUniform};
+use crate::cone_reach;
 use crate::light_views::{LightView, LightViews, light_views};
 use crate::receiver_plane::plane_tolerance;
 use crate::view_casters::{looked_up_behind, looked_up_in};
@@ -110,16 +111,17 @@ impl LightMapsOnGpu {
             let is_whole = scene.geometry.is_some();
             let seen_by = if is_whole { Receivers::seen_closely_by } else { Receivers::seen_by };
             let receivers = seen_by(&geometry, camera, light);
-            self.of_views(&geometry, light, &receivers, &views, &drawn, report)
+            self.of_views((&geometry, is_whole), light, &receivers, &views, &drawn, report)
         });
         let casters = drawn.into_iter().map(|object| object.triangles.clone()).collect();
         MapsPlan { views, casters, of_views, tolerance }
     }
 
     /// Of the objects `drawn` those that each view holds for `receivers`, as a whole; `None` where a lookup may read any texel.
+    /// `is_whole` says whether `geometry` holds triangles, and not boxes in their place.
     fn of_views(
         &self,
-        geometry: &Scene,
+        (geometry, is_whole): (&Scene, bool),
         light: &Light,
         receivers: &Receivers,
         views: &[LightView],
@@ -127,19 +129,37 @@ impl LightMapsOnGpu {
         report: &mut Report,
     ) -> Option<Vec<Vec<Range<u32>>>> {
         let size = self.params.map_size;
-        let Some(Reach::Texels(reach)) = Reach::of_lookup(&self.params, light) else { return None };
-        let of = |view: &LightView| {
-            let is_face = views.len() > 1;
-            let seen = if is_face {
-                receivers.clone().inside(&looked_up_in(view, size, reach)?)
-            } else {
-                receivers.clone()
-            };
-            if reads_whole_maps(self.params.variant) {
-                return Some(if seen.is_empty() { Vec::new() } else { drawn.to_vec() });
+        let reach = Reach::of_lookup(&self.params, light)?;
+        let is_face = views.len() > 1;
+        let sine = match reach {
+            // An object may be anywhere in the box that stands for it.
+            Reach::Cone if is_face && !is_whole => return None,
+            Reach::Cone if is_face => cone_reach::sine_beside(geometry, light, receivers, size)?,
+            _ => 0.0,
+        };
+        let touched = |region: &CasterRegion| {
+            drawn.iter().copied().filter(|object| region.touches(&object.bounds)).collect::<Vec<_>>()
+        };
+        let all_or_none = |seen: &Receivers| if seen.is_empty() { Vec::new() } else { drawn.to_vec() };
+        let of = |view: &LightView| match reach {
+            Reach::Texels(reach) => {
+                let mut seen = receivers.clone();
+                if is_face {
+                    seen = seen.inside(&looked_up_in(view, size, reach)?);
+                }
+                if reads_whole_maps(self.params.variant) {
+                    return Some(all_or_none(&seen));
+                }
+                Some(touched(&looked_up_behind(geometry, light, &seen, &[*view], size, reach)))
             }
-            let region = looked_up_behind(geometry, light, &seen, &[*view], size, reach);
-            Some(drawn.iter().copied().filter(|object| region.touches(&object.bounds)).collect())
+            Reach::Cone if is_face => {
+                let sides = cone_reach::looked_up_in(view, sine, size)?;
+                Some(all_or_none(&receivers.clone().inside(&sides)))
+            }
+            Reach::Cone => {
+                let window = cone_reach::read_texels(view, light, receivers, size)?;
+                Some(touched(&CasterRegion::inside(geometry, &view.sides_of(&window, size))))
+            }
         };
         let kept = views.iter().map(of).collect::<Option<Vec<_>>>()?;
         let triangles =

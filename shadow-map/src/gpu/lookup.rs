@@ -88,7 +88,7 @@ impl Lookup {
         }
     }
 
-    fn bytes(&self) -> u64 {
+    pub(super) fn bytes(&self) -> u64 {
         self.maps.layers().bytes() + self.filter.as_ref().map_or(0, FilterMapsOnGpu::bytes)
     }
 }
