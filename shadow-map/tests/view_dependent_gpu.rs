@@ -92,22 +92,23 @@ fn faces_that_nobody_sees_are_not_drawn() {
 #[test]
 fn pcss_leaves_out_what_no_cone_meets() {
     let Some(gpu) = testing::gpu() else { return };
-    let setup = scenes::build("forest:triangles=20000", 0.0).unwrap();
-    let bounds = setup.scene.bounds();
-    let position = bounds.center() + 0.1 * bounds.size();
-    let radius = 0.02 * bounds.size().min_element();
-    let sphere = Light::Sphere { center: position, radius };
     let sun = Light::Directional { direction: glam::Vec3::new(0.4, -1.0, 0.3), angular_radius: 0.02 };
     let (mut faces, mut casters, mut dark) = (0, 0, 0);
-    for seed in 0..6 {
-        let camera = random_view(&setup.scene, seed).with_size(64, 48);
-        let camera = Camera { fov_y: 0.3, ..camera };
-        for light in [sphere, sun] {
+    for (spec, is_sun) in [("forest:triangles=20000", true), ("cornell", false)] {
+        let setup = scenes::build(spec, 0.0).unwrap();
+        let bounds = setup.scene.bounds();
+        let radius = 0.01 * bounds.size().min_element();
+        // Above both blocks.
+        let center = bounds.center() + glam::Vec3::Y * (0.3 * bounds.size().y);
+        let light = if is_sun { sun } else { Light::Sphere { center, radius } };
+        for seed in 0..6 {
+            let camera = random_view(&setup.scene, seed).with_size(64, 48);
+            let camera = Camera { fov_y: 0.3, ..camera };
             let runs = run(&gpu, &setup.scene, &camera, &light, params((Variant::Pcss, Kernel::Grid)));
-            assert!(bits(&runs[0]) == bits(&runs[1]), "{light:?}, view {seed}");
+            assert!(bits(&runs[0]) == bits(&runs[1]), "{spec}, view {seed}");
             let count = |what| runs[1].report.skipped.get(what).copied().unwrap_or(0);
             faces += count("undrawn faces");
-            casters += if light == sun { count("casters outside view") } else { 0 };
+            casters += if is_sun { count("casters outside view") } else { 0 };
             dark += runs[0].visibility.values.iter().filter(|&&v| v < 1.0).count();
         }
     }
