@@ -37,38 +37,37 @@ pub fn texel_sides(
     normal: DVec3,
 ) -> [f64; 2] {
     let (t1, t2) = normal.any_orthonormal_pair();
-    let w = at(warp.w, point);
-    let place = warp.place(point);
-    let u = (warp.x - warp.w * place.x).truncate() / w;
-    let v = (warp.y - warp.w * place.y).truncate() / w;
     let [i, j] = frame.pixel_gradients(point);
-    let along = |a: DVec3, b: DVec3| DMat2::from_cols_array(&[a.dot(t1), b.dot(t1), a.dot(t2), b.dot(t2)]);
-    let in_image = along(i, j) * along(u, v).inverse();
+    let in_image = along(i, j, [t1, t2]) * surface_from_place(warp, point, [t1, t2]);
     let texel = window.texel(map_size);
     [in_image.x_axis.length() * texel.x, in_image.y_axis.length() * texel.y]
 }
 
-/// A side of a texel counts up to so many pixels: what casts is smaller than that as a rule, and a shadow that is lost whole
-/// cannot be lost again.
-const SATURATION: f64 = 16.0;
+/// Derivatives of two functions with these gradients along the surface's two directions.
+fn along(a: DVec3, b: DVec3, [t1, t2]: [DVec3; 2]) -> DMat2 {
+    DMat2::from_cols_array(&[a.dot(t1), b.dot(t1), a.dot(t2), b.dot(t2)])
+}
 
-/// What wrong pixels go by, better than by d itself: the mean of a texel's sides in the image, each at most 16 pixels, times the
-/// cosine between the normal and the way to the camera.
+/// How a point moves on the surface with its place in the map: the inverse of `J_m`.
+fn surface_from_place(warp: &Warp, point: DVec3, surface: [DVec3; 2]) -> DMat2 {
+    let w = at(warp.w, point);
+    let place = warp.place(point);
+    let u = (warp.x - warp.w * place.x).truncate() / w;
+    let v = (warp.y - warp.w * place.y).truncate() / w;
+    along(u, v, surface).inverse()
+}
+
+/// What wrong pixels go by: the mean length of a texel's sides on the surface, in scene units.
 ///
-/// It was chosen among powers, logarithms, caps and weights of the sides on the four scenes and eight lights of the example
-/// `directions`, with maps of 256 to 4096 texels, where its mean goes with the count of wrong pixels more closely than that of d.
-pub fn expected_error(
-    warp: &Warp,
-    window: &Window,
-    map_size: u32,
-    frame: &ViewFrame,
-    point: DVec3,
-    normal: DVec3,
-) -> f64 {
-    let sides = texel_sides(warp, window, map_size, frame, point, normal);
-    let to_eye = (frame.eye - point).normalize_or_zero();
-    // `min` takes the number if the other is none.
-    normal.dot(to_eye).max(0.0) * sides.map(|side| side.min(SATURATION)).iter().sum::<f64>() * 0.5
+/// Where shadows have ρ of edges on a unit of surface, a map moves each by a share of the texel's width c there, and the share
+/// ρc of the surface is wrong: that of the pixels that see it, too, however large they are on it. d is c over the width of a pixel,
+/// so that a mean of d counts the near ground, of which pixels see little and edges are few, for more than its wrong pixels.
+/// How ρ varies is not known before there is a map; it is taken for the same everywhere.
+pub fn expected_error(warp: &Warp, window: &Window, map_size: u32, point: DVec3, normal: DVec3) -> f64 {
+    let (t1, t2) = normal.any_orthonormal_pair();
+    let on_surface = surface_from_place(warp, point, [t1, t2]);
+    let texel = window.texel(map_size);
+    (on_surface.x_axis.length() * texel.x + on_surface.y_axis.length() * texel.y) * 0.5
 }
 
 /// d over what is seen.

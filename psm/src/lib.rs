@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod aliasing;
+pub mod caster_boxes;
 pub mod choice;
 pub mod cpu;
 #[cfg(feature = "gpu")]

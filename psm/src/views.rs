@@ -9,10 +9,10 @@ use scene_core::{Camera, GBuffer, Light, Report, Scene};
 use crate::aliasing::{self, Aliasing};
 use crate::choice::{Parametrisation, Situation, choose};
 use crate::light_image::{FACES, LightImage, face_of, face_volume};
-use crate::seen::{Seen, Wanted};
+use crate::seen::{Sample, Seen, Wanted};
 use crate::view_frame::ViewFrame;
 use crate::warp::{self, Warp, Window};
-use crate::{PsmParams, virtual_camera};
+use crate::{PsmParams, caster_boxes, virtual_camera};
 
 /// A map's projection.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +21,8 @@ pub struct MapView {
     pub parametrisation: Parametrisation,
     /// d over samples of the receivers, in pixels a texel.
     pub aliasing: Aliasing,
+    /// Mean of [`aliasing::expected_error`] over the samples near shadows, scene units.
+    pub measure: f64,
     /// World to clip space; x and y of the map lie in [−w, w], depth is reversed.
     pub clip_from_world: Mat4,
     /// The forms of `clip_from_world` that give the place in the map, −1 to 1.
@@ -50,6 +52,8 @@ pub struct Images {
     pub papers_shift: Vec<f64>,
     /// Bounds of all that casts.
     pub casters: Aabb,
+    /// Bounds of each object that casts.
+    pub boxes: Vec<Aabb>,
 }
 
 impl Images {
@@ -76,7 +80,9 @@ impl Images {
                 })
                 .unzip(),
         };
-        Self { images, papers_shift, casters }
+        let objects = scene.objects().iter().filter(|object| object.flags.casts);
+        let boxes = objects.map(|object| object.bounds).collect();
+        Self { images, papers_shift, casters, boxes }
     }
 
     /// Which image a receiver lies in.
@@ -130,6 +136,7 @@ fn map_view(
     if receivers.is_empty() {
         return None;
     }
+    let near_shadows = caster_boxes::near_shadows(&images.boxes, image.light, &seen.samples);
     let situation = Situation {
         image,
         frame,
@@ -137,6 +144,7 @@ fn map_view(
         receivers,
         papers_shift: images.papers_shift[index],
         samples: &seen.samples,
+        near_shadows: &near_shadows,
         map_size: params.map_size,
     };
     let chosen = choose(situation.candidates(params.variant))?;
@@ -158,6 +166,8 @@ fn map_view(
         [offsets.x.w, offsets.y.w, offsets.w.w].map(f64::abs).into_iter().fold(0.0, f64::max) / w[0];
     let window = window.widened().grown(rounding * f64::from(f32::EPSILON));
     let values = aliasing::of_samples(&warp, &window, params.map_size, frame, &seen.samples);
+    let error = |s: &Sample| aliasing::expected_error(&warp, &window, params.map_size, s.point, s.normal);
+    let measure = near_shadows.iter().map(error).sum::<f64>() / near_shadows.len().max(1) as f64;
     let clip_from_world = warp::clip_from_world(&window.fitted(&warp), image.light, w, images.casters);
     if !clip_from_world.is_finite() {
         return None;
@@ -165,5 +175,5 @@ fn map_view(
     // As the rasteriser sees it: rounded.
     let [x, y, w] = [0, 1, 3].map(|row| clip_from_world.row(row).as_dvec4());
     let aliasing = Aliasing::of(values);
-    Some(MapView { parametrisation, aliasing, clip_from_world, ndc: Warp { x, y, w } })
+    Some(MapView { parametrisation, aliasing, measure, clip_from_world, ndc: Warp { x, y, w } })
 }

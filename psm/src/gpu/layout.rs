@@ -1,7 +1,7 @@
 //! What shaders read and write, as they lay it out. A test holds every offset against the linked WGSL.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, Vec4};
+use glam::{DVec3, Vec3, Vec4};
 use scene_core::light::LightPoint;
 
 use crate::light_image::LightImage;
@@ -112,6 +112,24 @@ impl ImageUniform {
     }
 }
 
+/// `CasterBox` of `choice.wesl`: bounds of an object that casts, relative to the eye.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct BoxOnGpu {
+    /// Lower corner; 0 last.
+    pub low: Vec4,
+    /// Upper corner; 0 last.
+    pub high: Vec4,
+}
+
+impl BoxOnGpu {
+    /// Of each object that casts.
+    pub fn all(images: &Images, frame: &ViewFrame) -> Vec<Self> {
+        let from_eye = |corner: Vec3| (corner.as_dvec3() - frame.eye).extend(0.0).as_vec4();
+        images.boxes.iter().map(|b| Self { low: from_eye(b.min), high: from_eye(b.max) }).collect()
+    }
+}
+
 /// `View` of `frame.wesl`: what a map covers, found on the GPU.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -174,6 +192,7 @@ mod tests {
             "LightImage",
             [x, y, w, light, along_low, along_range, papers_shift, sine]
         );
+        assert_layout!(BoxOnGpu, CHOICE, "CasterBox", [low, high]);
         assert_layout!(ViewOnGpu, VIEWS, "View", [ndc, parametrisation, shift, measure]);
         assert_eq!(struct_layout(SEEN, "Tile").1 as u64, TILE_BYTES);
         assert_eq!(struct_layout(SEEN, "Choice").1 as u64, CHOICE_BYTES);

@@ -38,7 +38,9 @@ use crate::seen::TileGrid;
 use crate::view_frame::ViewFrame;
 use crate::views::Images;
 use crate::{PsmParams, lookup};
-use layout::{CHOICE_BYTES, FIT_BYTES, FrameUniform, ImageUniform, PROJECTION_STRIDE, TILE_BYTES, ViewOnGpu};
+use layout::{
+    BoxOnGpu, CHOICE_BYTES, FIT_BYTES, FrameUniform, ImageUniform, PROJECTION_STRIDE, TILE_BYTES, ViewOnGpu,
+};
 
 /// The technique on one device: pipelines, and the light prepared last.
 #[derive(Debug)]
@@ -47,6 +49,7 @@ pub struct PsmOnGpu {
     passes: Passes,
     frame: HeldBuffer,
     images: HeldBuffer,
+    boxes: HeldBuffer,
     written: Written,
     making: HeldGroup,
     own: HeldGroup,
@@ -116,7 +119,11 @@ impl PsmOnGpu {
         let limit = device.limits().max_texture_dimension_2d;
         GpuError::within("texels a side of a map", params.map_size, limit)?;
         let written = [binding::STORAGE_WRITE; 5];
-        let types: Vec<_> = [binding::UNIFORM, binding::STORAGE].into_iter().chain(written).collect();
+        let types: Vec<_> = [binding::UNIFORM, binding::STORAGE]
+            .into_iter()
+            .chain(written)
+            .chain([binding::STORAGE])
+            .collect();
         let making = HeldGroup::new(device, "psm", wgpu::ShaderStages::COMPUTE, &types);
         let stages = wgpu::ShaderStages::FRAGMENT;
         let types = [binding::UNIFORM, binding::STORAGE, binding::ID_LAYERS];
@@ -140,6 +147,7 @@ impl PsmOnGpu {
             passes: Passes::new(device, making.layout(), receivers.layout()),
             frame: HeldBuffer::uniform("frame"),
             images: HeldBuffer::storage("images of the light"),
+            boxes: HeldBuffer::storage("boxes of casters"),
             written: Written {
                 tiles: WorkBuffer::new("tiles"),
                 choices: WorkBuffer::new("choices"),
@@ -216,12 +224,15 @@ impl PsmOnGpu {
         let tiles = u64::from(grid.columns) * u64::from(grid.rows) * count;
         let frame = FrameUniform::new(&self.params, count as usize, grid, prepared.tolerance);
         let frame = self.frame.get(device, bytemuck::bytes_of(&frame));
-        let images = ImageUniform::all(&prepared.images, &ViewFrame::new(camera));
+        let view_frame = ViewFrame::new(camera);
+        let boxes = BoxOnGpu::all(&prepared.images, &view_frame);
+        let boxes = self.boxes.get(device, bytemuck::cast_slice(&boxes));
+        let images = ImageUniform::all(&prepared.images, &view_frame);
         let images = self.images.get(device, bytemuck::cast_slice(&images));
         let Written { tiles: at_tiles, choices, fits, views, projections } = &mut self.written;
         let views = views.get(device, count * size_of::<ViewOnGpu>() as u64)?;
         let projections = projections.get(device, count * PROJECTION_STRIDE)?;
-        let bound: [Bound; 7] = [
+        let bound: [Bound; 8] = [
             frame.clone().into(),
             images.into(),
             at_tiles.get(device, tiles * TILE_BYTES)?.into(),
@@ -229,6 +240,7 @@ impl PsmOnGpu {
             fits.get(device, tiles * FIT_BYTES)?.into(),
             views.clone().into(),
             projections.clone().into(),
+            boxes.into(),
         ];
         let making = self.making.get(device, &bound);
         let groups = [Some(&making), None, None, Some(&receivers)];

@@ -8,6 +8,7 @@ use scene_core::{Camera, GBuffer, Light, Scene, VisibilityImage, raster};
 
 /// Names, and ways in which light travels for a camera: with the view and against it, from above, in the camera's
 /// plane, and at 10° over the ground.
+#[allow(dead_code, reason = "some of those who include this module bring lights of their own")]
 pub(crate) fn directions(camera: &Camera) -> [(&'static str, Vec3); 8] {
     let side = camera.forward().cross(Vec3::Y).normalize();
     let ahead = Vec3::Y.cross(side);
@@ -69,6 +70,7 @@ impl<'a> Row<'a> {
 }
 
 /// Calls `visit` with scene, direction and row, for each scene of `specs` at `width` × `height` pixels.
+#[allow(dead_code, reason = "some of those who include this module bring lights of their own")]
 pub(crate) fn visit_rows(specs: &[&str], size: [u32; 2], mut visit: impl FnMut(&str, &str, &Row<'_>)) {
     for spec in specs {
         let setup = scene_core::scenes::build(spec, 0.0).expect("a built-in scene");
