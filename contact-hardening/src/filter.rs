@@ -20,8 +20,8 @@ const MAX_LAYERS: usize = 8;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Probe {
     Lit,
-    /// A blocker, and its place in the light's coordinates.
-    Blocked(Vec3),
+    /// A blocker, its place in the light's coordinates, and the third of its far side.
+    Blocked(Vec3, f32),
     Unknown,
 }
 
@@ -168,15 +168,19 @@ impl Asker<'_> {
             }
             let probe = if from_map { met(self.lines.meet(texel, at, t)) } else { self.probe(at, layer) };
             state.known |= probe != Probe::Unknown;
-            let Probe::Blocked(located) = probe else {
+            let Probe::Blocked(located, back) = probe else {
                 state.before = 0.0;
                 continue;
             };
             let above = (located.z / t).ln();
+            let back = (back.max(f32::MIN_POSITIVE) / t).ln();
+            // From its far side to the near one a blocker is passed; a thinner one than a step is widened to a step, for no
+            // layer may lie within.
+            let slack = (half - 0.5 * (above - back)).max(0.0);
             // The search finds some blockers: others may be nearer than the first layer, where they stand in the cone,
             // or beyond the last.
-            let is_within = (above >= -half || is_first && self.site.cone.contains(located))
-                && (above <= half || is_last);
+            let is_within = (above >= -slack || is_first && self.site.cone.contains(located))
+                && (back <= slack || is_last);
             state.blocked = is_within || above * state.before < 0.0;
             state.before = above;
         }
@@ -187,7 +191,7 @@ impl Asker<'_> {
         let Self { physical, site, .. } = self;
         let t = self.layers.t[layer];
         // A blocker that no map holds: on the line itself.
-        let on_line = || Probe::Blocked(Vec3::new(at.x * t, at.y * t, t));
+        let on_line = || Probe::Blocked(Vec3::new(at.x * t, at.y * t, t), t);
         if !self.map_first
             && let Some(pixel) = physical.pixel(site.footprint.pixel(at, t))
             && physical.knows(site, at, t, pixel)
@@ -195,7 +199,11 @@ impl Asker<'_> {
             return match physical.distance.shadow[pixel] {
                 0.0 => Probe::Lit,
                 _ if physical.distance.distance[pixel] == 0.0 => on_line(),
-                _ => Probe::Blocked(site.cone.locate(physical.blocker(pixel))),
+                _ => {
+                    let blocker = physical.blocker(pixel);
+                    let located = site.cone.locate(blocker);
+                    Probe::Blocked(located, self.lines.back_of(blocker, located))
+                }
             };
         }
         let own = physical.own(site);
@@ -205,7 +213,10 @@ impl Asker<'_> {
             Fill::Pixel if physical.distance.shadow[own] == 0.0 => Probe::Lit,
             Fill::Pixel if physical.distance.distance[own] == 0.0 => on_line(),
             // On the line to the light's centre.
-            Fill::Pixel => Probe::Blocked(Vec3::new(0.0, 0.0, physical.distance.distance[own])),
+            Fill::Pixel => {
+                let t = physical.distance.distance[own];
+                Probe::Blocked(Vec3::new(0.0, 0.0, t), t)
+            }
             Fill::Map => met(self.lines.look_up(at, t)),
         }
     }
@@ -214,6 +225,6 @@ impl Asker<'_> {
 fn met(met: Met) -> Probe {
     match met {
         Met::Nothing => Probe::Lit,
-        Met::Blocker(located) => Probe::Blocked(located),
+        Met::Blocker(located, back) => Probe::Blocked(located, back),
     }
 }

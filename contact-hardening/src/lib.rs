@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod backs;
 pub mod cpu;
 pub mod distance_map;
 pub mod filter;
@@ -16,6 +17,7 @@ pub mod search;
 pub mod shadow_pyramid;
 mod show;
 pub mod smoothing;
+pub mod solids;
 mod technique;
 
 use std::sync::Arc;
@@ -145,6 +147,11 @@ impl ContactHardening {
         let filter = FilterMaps::new(maps, params.skip, &mut report);
         let asked = u64::from(query.camera.width) * u64::from(query.camera.height) * u64::from(params.taps);
         let look_ups = report.time("prepare.tiles", |_| LookUps::new(filter, asked));
+        let look_ups = if params.solids && params.scaling == Scaling::Physical {
+            report.time("prepare.backs", |_| look_ups.with_backs())
+        } else {
+            look_ups
+        };
         report.bytes += look_ups.bytes();
         let source = match self.source() {
             Some(source) => {

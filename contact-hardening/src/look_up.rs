@@ -17,6 +17,8 @@ use rayon::prelude::*;
 use scene_core::light::LightPoint;
 use scene_core::raster::DepthMap;
 
+use crate::backs::Backs;
+
 /// Texels a side of a tile: 16 depths are 64 bytes.
 const SIDE: usize = 4;
 
@@ -80,6 +82,7 @@ pub struct LookUps<'a> {
     pub filter: FilterMaps<'a>,
     /// Of a lone map; the faces of a cube are asked in rows.
     tiled: Option<TiledDepth>,
+    backs: Backs,
 }
 
 impl<'a> LookUps<'a> {
@@ -90,7 +93,13 @@ impl<'a> LookUps<'a> {
             [lone] if look_ups > lone.map.depth.len() as u64 => Some(TiledDepth::new(&lone.map)),
             _ => None,
         };
-        Self { filter, tiled }
+        Self { filter, tiled, backs: Backs::default() }
+    }
+
+    /// The same, with the [far sides](crate::backs) of solid casters.
+    #[must_use]
+    pub fn with_backs(self) -> Self {
+        Self { backs: Backs::draw(&self.filter.maps), ..self }
     }
 
     /// The maps.
@@ -100,7 +109,7 @@ impl<'a> LookUps<'a> {
 
     /// Bytes beside those of `filter`.
     pub fn bytes(&self) -> u64 {
-        self.tiled.as_ref().map_or(0, |tiled| size_of_val(tiled.tiles.as_slice()) as u64)
+        self.backs.bytes() + self.tiled.as_ref().map_or(0, |tiled| size_of_val(tiled.tiles.as_slice()) as u64)
     }
 
     /// The lines from `receiver` to the light over `cone`.
@@ -134,8 +143,9 @@ impl<'a> LookUps<'a> {
 pub enum Met {
     /// Nothing that shadows the receiver.
     Nothing,
-    /// A blocker, in the light's coordinates ([`LightCone::locate`]); it need not lie on the line, nor in the cone.
-    Blocker(Vec3),
+    /// A blocker, in the light's coordinates ([`LightCone::locate`]); it need not lie on the line, nor in the cone. And the
+    /// third coordinate of its far side.
+    Blocker(Vec3, f32),
 }
 
 /// What is stored where a line is at some distance.
@@ -310,6 +320,25 @@ impl Lines<'_, '_> {
         let line = || LightPoint::Towards(self.cone.direction(at));
         let blocks = !self.near.holds(stored.point - point, stored.texel)
             || meets(maps.scene.corners(stored.triangle), point, line());
-        if blocks { Met::Blocker(located) } else { Met::Nothing }
+        if blocks { Met::Blocker(located, self.back_of(stored.point, located)) } else { Met::Nothing }
+    }
+
+    /// The third coordinate of the far side of a blocker that a map holds at `stored`: that of the blocker itself unless it is
+    /// solid.
+    #[inline]
+    pub fn back_of(&self, stored: Vec3, located: Vec3) -> f32 {
+        if self.look_ups.backs.is_empty() { located.z } else { self.back_in_map(stored, located) }
+    }
+
+    fn back_in_map(&self, stored: Vec3, located: Vec3) -> f32 {
+        let maps = self.look_ups.maps();
+        let views = maps.maps.iter().enumerate();
+        let back = views.filter_map(|(index, map)| Some((index, map, map.view.project(stored)?))).next();
+        let back = back.and_then(|(index, map, ndc)| {
+            let texel = map.texel(ndc);
+            let depth = self.look_ups.backs.depth(index, texel)?;
+            Some(self.cone.share_of(map.occluder(texel, depth).point))
+        });
+        back.map_or(located.z, |back| back.min(located.z))
     }
 }

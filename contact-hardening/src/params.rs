@@ -106,6 +106,9 @@ pub struct ContactHardeningParams {
     /// Points that the image cannot answer (hidden, outside, or nearer to each other than pixels are) are looked up
     /// in the map, with `physical` scaling. Off is the paper. `multi-pass` never does.
     pub fill: bool,
+    /// Casters that are closed surfaces are solid: what lies behind the side that the light's centre sees blocks, too, with
+    /// `physical` scaling. Off is the paper.
+    pub solids: bool,
     /// How the Gaussian of `paper` scaling is sampled.
     pub kernel: GaussianKernel,
     /// Widest kernel with `paper` scaling, pixels, 1 to 255.
@@ -137,6 +140,7 @@ impl ContactHardeningParams {
         geometry: true,
         smooth: true,
         fill: true,
+        solids: true,
         kernel: GaussianKernel::PoissonDisk,
         kernel_size: 19,
         widening: true,
@@ -157,6 +161,7 @@ impl ContactHardeningParams {
         taps: 20,
         geometry: false,
         fill: false,
+        solids: false,
         ..Self::DEFAULT
     };
 }
@@ -236,6 +241,12 @@ impl Params for ContactHardeningParams {
             SettingKind::Bool,
             "",
             "look up in the map what the image cannot answer, with physical scaling; false is the paper",
+        ),
+        setting(
+            "solids",
+            SettingKind::Bool,
+            "",
+            "closed casters block behind the side that is seen, too, with physical scaling; false is the paper",
         ),
         setting(
             "kernel",

@@ -92,7 +92,7 @@ impl Physical<'_> {
                 }
                 if fill
                     && !seen
-                    && let Met::Blocker(located) = lines.look_up(at, t)
+                    && let Met::Blocker(located, _) = lines.look_up(at, t)
                 {
                     blockers.add(located.z, self.is_parallel());
                 }
@@ -111,7 +111,7 @@ impl Physical<'_> {
                 lines.read(points, t, &mut texels);
                 for (index, (&at, texel)) in points.iter().zip(&texels).enumerate() {
                     if let Some(t) = t(index)
-                        && let Met::Blocker(located) = lines.meet(texel, at, t)
+                        && let Met::Blocker(located, _) = lines.meet(texel, at, t)
                     {
                         blockers.add(located.z, self.is_parallel());
                     }

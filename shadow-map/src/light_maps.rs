@@ -80,7 +80,7 @@ impl ShadowMapView {
     /// Column and row of normalised device coordinates within the map. Row 0 is on top, as in every image; NDC 1 belongs to
     /// the last texel.
     #[inline]
-    pub(crate) fn texel(&self, ndc: Vec2) -> [usize; 2] {
+    pub fn texel(&self, ndc: Vec2) -> [usize; 2] {
         let (size, last) = (self.map.width as f32, self.map.width as usize - 1);
         [ndc.x * 0.5 + 0.5, 0.5 - ndc.y * 0.5].map(|at| ((at * size) as usize).min(last))
     }
