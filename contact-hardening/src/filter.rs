@@ -175,8 +175,8 @@ impl Asker<'_> {
             let above = (located.z / t).ln();
             let back = (back.max(f32::MIN_POSITIVE) / t).ln();
             // From its far side to the near one a blocker is passed; a thinner one than a step is widened to a step, for no
-            // layer may lie within.
-            let slack = (half - 0.5 * (above - back)).max(0.0);
+            // layer may lie within. A layer that a found blocker lies on holds it, however it is rounded.
+            let slack = (half - 0.5 * (above - back)).max(CLOSE);
             // The search finds some blockers: others may be nearer than the first layer, where they stand in the cone,
             // or beyond the last.
             let is_within = (above >= -slack || is_first && self.site.cone.contains(located))

@@ -8,6 +8,7 @@
 //! other one; where the map's texel on a caster's outline holds another triangle; and where a pixel stands so near to one of
 //! the decisions of [`physical`](crate::physical) that rounding turns it.
 
+mod backs;
 mod images;
 pub mod layout;
 mod passes;
@@ -25,7 +26,8 @@ use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Light, Report};
 
 use crate::kernel::Kernel;
-use crate::{ContactHardening, ContactHardeningParams};
+use crate::{ContactHardening, ContactHardeningParams, Scaling};
+use backs::BacksOnGpu;
 use images::{Image, ONE, PAIRS};
 use layout::SettingsTable;
 use passes::{Slot, Step, steps};
@@ -36,6 +38,8 @@ pub struct ContactHardeningOnGpu {
     technique: ContactHardening,
     maps: LightMapsOnGpu,
     filter: FilterMapsOnGpu,
+    /// Where closed casters are solid.
+    backs: Option<BacksOnGpu>,
     scene: SceneBindings,
     receivers: Receivers,
     source: Option<SourceOnGpu>,
@@ -98,6 +102,8 @@ impl Images {
 struct Prepared {
     /// The first four bindings of group 0.
     maps: Vec<Bound>,
+    /// The last.
+    backs: Bound,
     scene: SceneGroups,
     kernel: Kernel,
     is_parallel: bool,
@@ -144,6 +150,7 @@ impl ContactHardeningOnGpu {
             binding::FLOATS,
             binding::FLOATS,
             binding::UNIFORM,
+            binding::STORAGE,
         ];
         let own = HeldGroup::new(device, "contact hardening", fragment, &types);
         let scene = SceneBindings::new(device, fragment | wgpu::ShaderStages::COMPUTE);
@@ -166,6 +173,8 @@ impl ContactHardeningOnGpu {
             technique: technique.clone(),
             maps: LightMapsOnGpu::new(device, map),
             filter: FilterMapsOnGpu::new(device, params.map_size, &scene.triangles_layout),
+            backs: (params.solids && params.scaling == Scaling::Physical)
+                .then(|| BacksOnGpu::new(device, params.map_size, &scene.triangles_layout)),
             scene,
             receivers,
             source,
@@ -193,7 +202,13 @@ impl ContactHardeningOnGpu {
         if let Some(drawn) = self.maps.draw(recorder, &query.scene, &plan, "prepare.maps")? {
             let scene = self.scene.groups(device, &query.scene);
             let depths = self.filter.record(recorder, &drawn, &scene.triangles)?;
+            let backs = match &mut self.backs {
+                Some(backs) => backs.record(recorder, &query.scene, &plan, &drawn, &scene.triangles)?,
+                None => None,
+            };
             self.prepared = Some(Prepared {
+                // What has no far side is as thin as its near one.
+                backs: backs.unwrap_or_else(|| depths.clone()).into(),
                 maps: vec![drawn.maps.into(), drawn.views.into(), drawn.ids, depths.into()],
                 scene,
                 kernel: self.technique.params.kernel_for(query.light),
@@ -261,6 +276,7 @@ impl ContactHardeningOnGpu {
                 (&second).into(),
                 (&third).into(),
                 uniform.into(),
+                prepared.backs.clone(),
             ]);
             let own = own.get(device, &bound);
             let target = self.images.get(device, step.writes, size).unwrap_or_else(|| visibility.clone());
@@ -282,7 +298,13 @@ impl ContactHardeningOnGpu {
 
     fn bytes(&self) -> u64 {
         let source = self.source.as_ref().map_or(0, |source| source.image.bytes());
-        self.maps.layers().bytes() + self.filter.bytes() + self.pyramid.bytes() + self.images.bytes() + source
+        let backs = self.backs.as_ref().map_or(0, BacksOnGpu::bytes);
+        backs
+            + self.maps.layers().bytes()
+            + self.filter.bytes()
+            + self.pyramid.bytes()
+            + self.images.bytes()
+            + source
     }
 
     /// Whether the preparation holds for any camera.
