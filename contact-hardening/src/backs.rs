@@ -6,7 +6,8 @@
 
 use std::ops::Range;
 
-use gnomon_shadow_map::light_maps::LightMaps;
+use glam::Vec3;
+use gnomon_shadow_map::light_maps::{LightMaps, ShadowMapView};
 use scene_core::raster::{Cull, DepthMap, DepthOptions, RasterScratch, render_depth_into};
 
 use crate::solids::is_solid;
@@ -52,7 +53,7 @@ impl Backs {
         }
         let mut scratch = RasterScratch::new();
         let mut thin = DepthMap::default();
-        let draw = |view: &gnomon_shadow_map::light_maps::ShadowMapView| {
+        let draw = |view: &ShadowMapView| {
             let mut back = DepthMap { width: view.map.width, height: view.map.height, ..Default::default() };
             if view.map.depth.iter().all(|&depth| depth == 0.0) {
                 return back;
@@ -75,11 +76,13 @@ impl Backs {
         Self { maps: maps.maps.iter().map(draw).collect() }
     }
 
-    /// The depth in a texel of a view, if it holds any.
+    /// The far side in a texel of `map`, the view of this index, if it holds any.
     #[inline]
-    pub fn depth(&self, view: usize, [column, row]: [usize; 2]) -> Option<f32> {
-        let map = self.maps.get(view)?;
-        map.depth.get(row * map.width as usize + column).copied().filter(|&depth| depth > 0.0)
+    pub fn point(&self, map: &ShadowMapView, view: usize, [column, row]: [usize; 2]) -> Option<Vec3> {
+        let back = self.maps.get(view)?;
+        let depth =
+            back.depth.get(row * back.width as usize + column).copied().filter(|&depth| depth > 0.0)?;
+        Some(map.view.unproject(map.center([column, row]), depth))
     }
 
     /// Whether there are any.

@@ -8,8 +8,8 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::look_up::{BATCH, Lines, Met, Texel, batches};
-use crate::params::Blocker;
+use crate::look_up::{BATCH, Blocker, Lines, Met, Place, Texel, batches};
+use crate::params::Blocker as Which;
 use crate::physical::{Physical, Site};
 use crate::search::Blockers;
 
@@ -20,8 +20,7 @@ const MAX_LAYERS: usize = 8;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Probe {
     Lit,
-    /// A blocker, its place in the light's coordinates, and the third of its far side.
-    Blocked(Vec3, f32),
+    Blocked(Blocker),
     Unknown,
 }
 
@@ -51,12 +50,12 @@ struct Layers {
 const CLOSE: f32 = 1.0 / 1024.0;
 
 impl Layers {
-    fn new(which: Blocker, blockers: &Blockers, mean: f32) -> Self {
+    fn new(which: Which, blockers: &Blockers, mean: f32) -> Self {
         let mut layers = Self { t: [mean; MAX_LAYERS], count: 1, half: f32::INFINITY };
         match which {
-            Blocker::Average => {}
-            Blocker::Minimum => layers.t[0] = blockers.least,
-            Blocker::Each => {
+            Which::Average => {}
+            Which::Minimum => layers.t[0] = blockers.least,
+            Which::Each => {
                 // A step widens the footprint by at most √2. Half a step to each side leaves no gap between layers; wider
                 // windows would count what another layer's footprint answers for.
                 let ratio = blockers.greatest / blockers.least;
@@ -168,19 +167,26 @@ impl Asker<'_> {
             }
             let probe = if from_map { met(self.lines.meet(texel, at, t)) } else { self.probe(at, layer) };
             state.known |= probe != Probe::Unknown;
-            let Probe::Blocked(located, back) = probe else {
+            let Probe::Blocked(blocker) = probe else {
                 state.before = 0.0;
                 continue;
             };
+            let located = blocker.located;
             let above = (located.z / t).ln();
-            let back = (back.max(f32::MIN_POSITIVE) / t).ln();
-            // From its far side to the near one a blocker is passed; a thinner one than a step is widened to a step, for no
-            // layer may lie within. A layer that a found blocker lies on holds it, however it is rounded.
-            let slack = (half - 0.5 * (above - back)).max(CLOSE);
             // The search finds some blockers: others may be nearer than the first layer, where they stand in the cone,
             // or beyond the last.
-            let is_within = (above >= -slack || is_first && self.site.cone.contains(located))
-                && (back <= slack || is_last);
+            let reaches_down = |slack: f32| above >= -slack || is_first && self.site.cone.contains(located);
+            let is_within = if half.is_infinite() {
+                true
+            } else if reaches_down(half) {
+                // From its far side to the near one a blocker is passed; a thinner one than a step is widened to a step, for no
+                // layer may lie within. A layer that lies on a side of one holds it, however it is rounded.
+                let back = (self.lines.far_side(&blocker).max(f32::MIN_POSITIVE) / t).ln();
+                let slack = (half - 0.5 * (above - back)).max(half.min(CLOSE));
+                reaches_down(slack) && (back <= slack || is_last)
+            } else {
+                false
+            };
             state.blocked = is_within || above * state.before < 0.0;
             state.before = above;
         }
@@ -191,7 +197,7 @@ impl Asker<'_> {
         let Self { physical, site, .. } = self;
         let t = self.layers.t[layer];
         // A blocker that no map holds: on the line itself.
-        let on_line = || Probe::Blocked(Vec3::new(at.x * t, at.y * t, t), t);
+        let on_line = || thin(Vec3::new(at.x * t, at.y * t, t));
         if !self.map_first
             && let Some(pixel) = physical.pixel(site.footprint.pixel(at, t))
             && physical.knows(site, at, t, pixel)
@@ -202,7 +208,7 @@ impl Asker<'_> {
                 _ => {
                     let blocker = physical.blocker(pixel);
                     let located = site.cone.locate(blocker);
-                    Probe::Blocked(located, self.lines.back_of(blocker, located))
+                    Probe::Blocked(Blocker { located, place: Place::Point(blocker) })
                 }
             };
         }
@@ -213,10 +219,7 @@ impl Asker<'_> {
             Fill::Pixel if physical.distance.shadow[own] == 0.0 => Probe::Lit,
             Fill::Pixel if physical.distance.distance[own] == 0.0 => on_line(),
             // On the line to the light's centre.
-            Fill::Pixel => {
-                let t = physical.distance.distance[own];
-                Probe::Blocked(Vec3::new(0.0, 0.0, t), t)
-            }
+            Fill::Pixel => thin(Vec3::new(0.0, 0.0, physical.distance.distance[own])),
             Fill::Map => met(self.lines.look_up(at, t)),
         }
     }
@@ -225,6 +228,10 @@ impl Asker<'_> {
 fn met(met: Met) -> Probe {
     match met {
         Met::Nothing => Probe::Lit,
-        Met::Blocker(located, back) => Probe::Blocked(located, back),
+        Met::Blocker(blocker) => Probe::Blocked(blocker),
     }
+}
+
+fn thin(located: Vec3) -> Probe {
+    Probe::Blocked(Blocker { located, place: Place::Thin })
 }

@@ -143,9 +143,28 @@ impl<'a> LookUps<'a> {
 pub enum Met {
     /// Nothing that shadows the receiver.
     Nothing,
-    /// A blocker, in the light's coordinates ([`LightCone::locate`]); it need not lie on the line, nor in the cone. And the
-    /// third coordinate of its far side.
-    Blocker(Vec3, f32),
+    /// A blocker; it need not lie on the line, nor in the cone.
+    Blocker(Blocker),
+}
+
+/// A blocker's near side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blocker {
+    /// In the light's coordinates ([`LightCone::locate`]).
+    pub located: Vec3,
+    /// Where its far side is looked up.
+    pub place: Place,
+}
+
+/// Where the [far side](crate::backs) of a blocker is looked up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Place {
+    /// Nowhere: it has none.
+    Thin,
+    /// In this texel, column and row, of the receiver's own view.
+    Texel([u32; 2]),
+    /// In the texel that holds this point.
+    Point(Vec3),
 }
 
 /// What is stored where a line is at some distance.
@@ -292,7 +311,7 @@ impl Lines<'_, '_> {
                     return Met::Nothing;
                 }
                 let place = [texel.column as usize, texel.row as usize];
-                self.ask(&face.map.occluder(place, texel.depth), at)
+                self.ask(&face.map.occluder(place, texel.depth), at, Place::Texel([texel.column, texel.row]))
             }
             _ => self.meet_elsewhere(at, t),
         }
@@ -303,13 +322,13 @@ impl Lines<'_, '_> {
         let Receiver { point, normal, tolerance, .. } = self.receiver;
         let stored = self.look_ups.maps().occluder(point + self.cone.direction(at) * t);
         let stored = stored.filter(|stored| rises_above(stored.point, point, normal, tolerance));
-        stored.map_or(Met::Nothing, |stored| self.ask(&stored, at))
+        stored.map_or(Met::Nothing, |stored| self.ask(&stored, at, Place::Point(stored.point)))
     }
 
     /// The questions of shadow-map's `receiver_plane`; a neighbour on the same surface is asked outright, by the line to
     /// this point of the light.
     #[inline]
-    fn ask(&self, stored: &Occluder, at: Vec2) -> Met {
+    fn ask(&self, stored: &Occluder, at: Vec2, place: Place) -> Met {
         let Receiver { point, tolerance, .. } = self.receiver;
         let maps = self.look_ups.maps();
         let located = self.cone.locate(stored.point);
@@ -320,25 +339,26 @@ impl Lines<'_, '_> {
         let line = || LightPoint::Towards(self.cone.direction(at));
         let blocks = !self.near.holds(stored.point - point, stored.texel)
             || meets(maps.scene.corners(stored.triangle), point, line());
-        if blocks { Met::Blocker(located, self.back_of(stored.point, located)) } else { Met::Nothing }
+        if blocks { Met::Blocker(Blocker { located, place }) } else { Met::Nothing }
     }
 
-    /// The third coordinate of the far side of a blocker that a map holds at `stored`: that of the blocker itself unless it is
-    /// solid.
+    /// The third coordinate of a blocker's far side: that of its near side unless it is solid.
     #[inline]
-    pub fn back_of(&self, stored: Vec3, located: Vec3) -> f32 {
-        if self.look_ups.backs.is_empty() { located.z } else { self.back_in_map(stored, located) }
-    }
-
-    fn back_in_map(&self, stored: Vec3, located: Vec3) -> f32 {
-        let maps = self.look_ups.maps();
-        let views = maps.maps.iter().enumerate();
-        let back = views.filter_map(|(index, map)| Some((index, map, map.view.project(stored)?))).next();
-        let back = back.and_then(|(index, map, ndc)| {
-            let texel = map.texel(ndc);
-            let depth = self.look_ups.backs.depth(index, texel)?;
-            Some(self.cone.share_of(map.occluder(texel, depth).point))
-        });
-        back.map_or(located.z, |back| back.min(located.z))
+    pub fn far_side(&self, blocker: &Blocker) -> f32 {
+        let backs = &self.look_ups.backs;
+        let far = match blocker.place {
+            _ if backs.is_empty() => None,
+            Place::Thin => None,
+            Place::Texel(texel) => self
+                .face
+                .as_ref()
+                .and_then(|face| backs.point(face.map, face.index, texel.map(|at| at as usize))),
+            Place::Point(stored) => {
+                let mut views = self.look_ups.maps().maps.iter().enumerate();
+                let found = views.find_map(|(index, map)| Some((index, map, map.view.project(stored)?)));
+                found.and_then(|(index, map, ndc)| backs.point(map, index, map.texel(ndc)))
+            }
+        };
+        far.map_or(blocker.located.z, |far| self.cone.share_of(far).min(blocker.located.z))
     }
 }

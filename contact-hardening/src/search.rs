@@ -92,9 +92,9 @@ impl Physical<'_> {
                 }
                 if fill
                     && !seen
-                    && let Met::Blocker(located, _) = lines.look_up(at, t)
+                    && let Met::Blocker(found) = lines.look_up(at, t)
                 {
-                    blockers.add(located.z, self.is_parallel());
+                    blockers.add(found.located.z, self.is_parallel());
                 }
             }
         }
@@ -111,9 +111,9 @@ impl Physical<'_> {
                 lines.read(points, t, &mut texels);
                 for (index, (&at, texel)) in points.iter().zip(&texels).enumerate() {
                     if let Some(t) = t(index)
-                        && let Met::Blocker(located, _) = lines.meet(texel, at, t)
+                        && let Met::Blocker(found) = lines.meet(texel, at, t)
                     {
-                        blockers.add(located.z, self.is_parallel());
+                        blockers.add(found.located.z, self.is_parallel());
                     }
                 }
             }

@@ -19,7 +19,7 @@ fn rounded(error: f64) -> f64 {
 #[test]
 fn errors_do_not_grow() {
     let mut table = String::from("scene variant rmse pen_rmse\n");
-    for spec in ["quads", "ball", "pool", "log-cabin", "fence", "street"] {
+    for spec in ["quads", "ball", "pool", "log-cabin", "fence", "street", "edges"] {
         let mut setup = scenes::build(spec, 0.0).expect("a built-in scene");
         (setup.camera.width, setup.camera.height) = (160, 120);
         let (scene, light) = (&setup.scene, &setup.lights[0]);

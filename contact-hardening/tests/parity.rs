@@ -179,6 +179,7 @@ fn every_setting_agrees() {
         ContactHardeningParams { geometry: false, ..params },
         ContactHardeningParams { fill: false, ..params },
         ContactHardeningParams { smooth: false, ..params },
+        ContactHardeningParams { solids: false, ..params },
         ContactHardeningParams { skip: false, ..params },
         ContactHardeningParams { blocker: Blocker::Average, ..params },
         ContactHardeningParams { blocker: Blocker::Minimum, seed: 7, ..params },
@@ -186,6 +187,18 @@ fn every_setting_agrees() {
         ContactHardeningParams { show: Show::Distance, ..params },
     ] {
         check(&gpu, "ball", None, params);
+    }
+}
+
+/// Solids on a floor under a lamp larger than they are, and solids among leaves.
+#[test]
+fn solids_agree() {
+    let Some(gpu) = testing::gpu() else { return };
+    for name in ["edges", "log-cabin"] {
+        for blocker in [Blocker::Each, Blocker::Average] {
+            let params = ContactHardeningParams { blocker, ..with(Variant::Pcf, Scaling::Physical) };
+            check(&gpu, name, None, params);
+        }
     }
 }
 

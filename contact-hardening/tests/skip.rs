@@ -6,7 +6,7 @@ use scene_core::{VisibilityImage, raster, scenes};
 
 #[test]
 fn skipping_never_changes_the_image() {
-    for scene in ["ball", "fence", "quads", "street"] {
+    for scene in ["ball", "fence", "quads", "street", "edges"] {
         let mut setup = scenes::build(scene, 0.0).expect("built in");
         (setup.camera.width, setup.camera.height) = (131, 97);
         let gbuffer = raster::render_gbuffer(&setup.scene, &setup.camera);

@@ -58,13 +58,19 @@ impl ShadowMapView {
             && (rows.start as usize..rows.end as usize).contains(&row)
     }
 
+    /// The centre of a texel (column and row), in normalised device coordinates.
+    #[inline]
+    pub fn center(&self, [column, row]: [usize; 2]) -> Vec2 {
+        let center = Vec2::new(column as f32 + 0.5, row as f32 + 0.5) * (2.0 / self.map.width as f32);
+        Vec2::new(center.x - 1.0, 1.0 - center.y)
+    }
+
     /// The surface stored in a texel (column and row) at `depth`, which is not 0.
     #[inline]
     pub fn occluder(&self, [column, row]: [usize; 2], depth: f32) -> Occluder {
         let texel = 2.0 / self.map.width as f32;
-        let center = Vec2::new(column as f32 + 0.5, row as f32 + 0.5) * texel;
         Occluder {
-            point: self.view.unproject(Vec2::new(center.x - 1.0, 1.0 - center.y), depth),
+            point: self.view.unproject(self.center([column, row]), depth),
             triangle: self.triangles[row * self.map.width as usize + column] as usize,
             texel: self.view.half_diagonal(depth) * texel,
         }
