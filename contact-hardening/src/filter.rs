@@ -177,7 +177,8 @@ impl Asker<'_> {
             // or beyond the last.
             let reaches_down = |slack: f32| above >= -slack || is_first && self.site.cone.contains(located);
             let is_within = if half.is_infinite() {
-                true
+                // One layer is asked for all, but what a pixel holds may lie behind the receiver.
+                located.z > 0.0
             } else if reaches_down(half) {
                 // From its far side to the near one a blocker is passed; a thinner one than a step is widened to a step, for no
                 // layer may lie within. A layer that lies on a side of one holds it, however it is rounded.

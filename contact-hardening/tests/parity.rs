@@ -195,10 +195,7 @@ fn every_setting_agrees() {
 fn solids_agree() {
     let Some(gpu) = testing::gpu() else { return };
     for name in ["edges", "log-cabin"] {
-        for blocker in [Blocker::Each, Blocker::Average] {
-            let params = ContactHardeningParams { blocker, ..with(Variant::Pcf, Scaling::Physical) };
-            check(&gpu, name, None, params);
-        }
+        check(&gpu, name, None, with(Variant::Pcf, Scaling::Physical));
     }
 }
 
