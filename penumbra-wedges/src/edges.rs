@@ -86,7 +86,7 @@ impl Edges {
     /// face in `relevant` are kept.
     pub fn from_some_point(casters: &Casters<'_>, sides: &[FaceSide], relevant: &[Range<usize>]) -> Self {
         let (topology, scene) = (&casters.topology, casters.scene);
-        Self::collect(casters, relevant, |edge, variable| {
+        Self::collect(casters.scene, topology, relevant, |edge, variable| {
             let faces = topology.faces(edge);
             let mut fixed = 0;
             for face in faces {
@@ -108,21 +108,23 @@ impl Edges {
 
     /// The silhouette that one point of the light sees, for faces turned by `facing`; 0 leaves a face out.
     pub fn from_one_point(casters: &Casters<'_>, facing: &[i8], relevant: &[Range<usize>]) -> Self {
-        Self::collect(casters, relevant, |edge, _| {
-            let multiplicity = casters.topology.multiplicity(edge, facing);
+        let topology = &casters.bodies().topology;
+        Self::collect(casters.scene, topology, relevant, |edge, _| {
+            let multiplicity = topology.multiplicity(edge, facing);
             (multiplicity != 0).then_some(-multiplicity)
         })
     }
 
-    /// Asks `keep` for each edge with a face in `relevant`.
+    /// Asks `keep` for each edge, and takes those that have a face in `relevant`.
     fn collect(
-        casters: &Casters<'_>,
+        scene: &Scene,
+        topology: &EdgeTopology,
         relevant: &[Range<usize>],
         keep: impl Fn(usize, &mut Vec<Incidence>) -> Option<i32> + Sync,
     ) -> Self {
         /// Edges a task.
         const CHUNK: usize = 1 << 13;
-        let (topology, positions) = (&casters.topology, casters.scene.positions());
+        let positions = scene.positions();
         let is_relevant = |face: &Incidence| {
             let face = face.face() as usize;
             let next = relevant.partition_point(|range| range.end <= face);

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod area_light;
+pub mod bodies;
 mod casters;
 pub mod chord;
 pub mod coverage;
@@ -16,6 +17,7 @@ pub mod layers;
 mod params;
 pub mod receiver;
 pub mod samples;
+pub mod seams;
 pub mod shaft;
 mod technique;
 pub mod wedge;

@@ -39,8 +39,7 @@ pub struct Wedges {
 /// For variants that take the silhouette that the light's middle sees.
 #[derive(Debug, Default)]
 pub struct FromMiddle {
-    /// The facing of each face that counts as a layer, else 0: of closed bodies only those turned to the light, of sheets
-    /// all.
+    /// The facing of each face that counts as a layer ([`bodies`](crate::bodies)), else 0.
     pub facing: Vec<i8>,
     /// The side planes of each edge; for `interpolated`.
     pub sides: Vec<[Side; 2]>,
@@ -73,6 +72,9 @@ impl Wedges {
             (sides, traced)
         });
         let from_middle = params.variant != Variant::Exact;
+        if from_middle {
+            report.time("prepare.bodies", |_| casters.bodies());
+        }
         let (edges, facing) = report.time("prepare.silhouette", |_| {
             if from_middle {
                 let facing = layers(casters, &area, &face_sides);
@@ -124,14 +126,13 @@ impl Wedges {
 
 /// The facing of faces that count as layers, from the light's middle.
 fn layers(casters: &Casters<'_>, light: &AreaLight, sides: &[FaceSide]) -> Vec<i8> {
-    let closed = casters.closed_faces();
+    let kinds = &casters.bodies().kinds;
     let center = light.center();
     casters.for_faces(0, |face| {
         let corners: [Vec3; 3] = casters.scene.corners(face);
         match (sides[face], facing_of(corners, center)) {
             (FaceSide::None, _) => 0,
-            (_, facing) if closed[face] => facing.max(0),
-            (_, facing) => facing,
+            (_, facing) => kinds[face].counts(facing),
         }
     })
 }

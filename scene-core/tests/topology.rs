@@ -277,6 +277,20 @@ proptest! {
     }
 
     #[test]
+    fn edges_given_side_by_side_are_the_same((positions, triangles) in soup()) {
+        let edges = topology(&positions, &triangles);
+        let directed = (0..edges.len()).rev().flat_map(|edge| {
+            let [a, b] = edges.vertices()[edge];
+            edges.faces(edge).iter().map(move |f| (if f.sign() > 0 { [a, b] } else { [b, a] }, f.face()))
+        });
+        let again = EdgeTopology::of_sides(directed.collect());
+        prop_assert_eq!(again.vertices(), edges.vertices());
+        for edge in 0..edges.len() {
+            prop_assert_eq!(again.faces(edge), edges.faces(edge));
+        }
+    }
+
+    #[test]
     fn large_meshes_are_cut_into_the_same_tasks(side in 100usize..180) {
         // More corners than one task takes: a grid with its known number of edges.
         let positions: Vec<Vec3> =

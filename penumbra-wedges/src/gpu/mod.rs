@@ -136,7 +136,7 @@ impl PenumbraWedgesOnGpu {
         let kept = self.tables.take().filter(|tables| tables.are_of(&query.scene));
         let tables = match kept {
             Some(tables) => tables,
-            None => report.time("prepare.edges", |_| new_tables(device, query))?,
+            None => report.time("prepare.edges", |_| new_tables(device, query, self.params.variant))?,
         };
         if let Some(object) = tables.masked.as_ref().filter(|_| self.params.variant != Variant::Exact) {
             return Err(WedgeError::Masked { object: object.clone() }.into());
@@ -351,13 +351,17 @@ fn side_bytes(tables: &Tables) -> u64 {
     48 * u64::from(tables.edge_count.max(1))
 }
 
-fn new_tables(device: &wgpu::Device, query: &GpuShadowQuery<'_>) -> Result<Tables, TechniqueError> {
+fn new_tables(
+    device: &wgpu::Device,
+    query: &GpuShadowQuery<'_>,
+    variant: Variant,
+) -> Result<Tables, TechniqueError> {
     let geometry = query.scene.geometry.ok_or_else(|| TechniqueError::Unsupported {
         technique: WedgeParams::TECHNIQUE,
         input: "a scene without its geometry in memory".to_owned(),
         why: "edges are found from it, once a scene".to_owned(),
     })?;
-    Tables::new(device, &query.scene, geometry).map_err(|error| match error {
+    Tables::new(device, &query.scene, geometry, variant).map_err(|error| match error {
         TablesError::Gpu(error) => error.into(),
         TablesError::Wedges(error) => error.into(),
     })

@@ -3,6 +3,8 @@
 use scene_core::Scene;
 use scene_core::gpu::{CasterTrees, GpuError, GpuScene, storage_buffer};
 
+use crate::Variant;
+use crate::bodies::FaceKind;
 use crate::casters::{Casters, has_edges};
 use crate::edges::is_flat;
 use crate::error::WedgeError;
@@ -28,7 +30,7 @@ pub struct Tables {
     pub edges: wgpu::Buffer,
     /// Twice the face, and 1 if it runs along the edge.
     pub incident: wgpu::Buffer,
-    /// Two bits a triangle: whether it is a solid caster, and whether it is part of a closed body.
+    /// Four bits a triangle: whether it is a solid caster, and twice its [`FaceKind`], for variants that ask for it.
     pub kinds: wgpu::Buffer,
     /// Nodes of the trees.
     pub nodes: wgpu::Buffer,
@@ -51,14 +53,20 @@ pub struct Tables {
 }
 
 impl Tables {
-    /// Builds and uploads the tables of `scene`, whose geometry is `geometry`.
+    /// Builds and uploads the tables of `scene`, whose geometry is `geometry`, for `variant`.
     ///
     /// # Errors
     /// More triangles than can be numbered, or an array larger than the device binds in one piece.
-    pub fn new(device: &wgpu::Device, scene: &GpuScene<'_>, geometry: &Scene) -> Result<Self, TablesError> {
+    pub fn new(
+        device: &wgpu::Device,
+        scene: &GpuScene<'_>,
+        geometry: &Scene,
+        variant: Variant,
+    ) -> Result<Self, TablesError> {
         let casters = Casters::new(geometry)?;
+        let bodies = (variant != Variant::Exact).then(|| casters.bodies());
         let trees = CasterTrees::new(geometry, &casters.tree);
-        let topology = &casters.topology;
+        let topology = bodies.map_or(&*casters.topology, |bodies| &bodies.topology);
         let (mut edges, mut incident) = (Vec::with_capacity(topology.len()), Vec::new());
         for (edge, [a, b]) in topology.vertices().iter().enumerate() {
             let faces = topology.faces(edge);
@@ -67,10 +75,10 @@ impl Tables {
             incident.extend(faces.iter().map(|f| f.face() << 1 | u32::from(f.sign() > 0)));
         }
         let triangles = geometry.triangles().len();
-        let closed = casters.closed_faces();
-        let mut kinds = vec![0_u32; triangles.div_ceil(16)];
+        let mut kinds = vec![0_u32; triangles.div_ceil(8)];
         for triangle in geometry.objects().iter().filter(|o| has_edges(o)).flat_map(|o| o.triangles.clone()) {
-            kinds[triangle / 16] |= (1 | u32::from(closed[triangle]) << 1) << (2 * (triangle % 16));
+            let kind = bodies.map_or(FaceKind::Nothing, |bodies| bodies.kinds[triangle]);
+            kinds[triangle / 8] |= (1 | (kind as u32) << 1) << (4 * (triangle % 8));
         }
         let buffer = |what, bytes| storage_buffer(device, what, bytes);
         Ok(Self {

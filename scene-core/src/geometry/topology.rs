@@ -203,6 +203,26 @@ impl EdgeTopology {
         Ok(Self { degenerate, ..collect_edges(&mut entries, bucket_end) })
     }
 
+    /// The edges of faces whose sides are given one by one, each by the vertices that the face runs along, from the first to
+    /// the second, and the face: for surfaces that meet without ending at the same vertices, once their sides are cut to pieces.
+    pub fn of_sides(mut sides: Vec<([u32; 2], u32)>) -> Self {
+        let key = |&([from, to], face): &([u32; 2], u32)| {
+            (from.min(to), from.max(to), Incidence::new(face, from < to).0)
+        };
+        sides.par_sort_unstable_by_key(key);
+        let mut topology = Self::default();
+        for (index, side) in sides.iter().enumerate() {
+            let (lower, upper, incidence) = key(side);
+            if topology.vertices.last() != Some(&[lower, upper]) {
+                topology.vertices.push([lower, upper]);
+                topology.first.push(index as u32);
+            }
+            topology.incident.push(Incidence(incidence));
+        }
+        topology.first.push(sides.len() as u32);
+        topology
+    }
+
     /// Undirected edges there are.
     pub fn len(&self) -> usize {
         self.vertices.len()
