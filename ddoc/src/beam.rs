@@ -19,8 +19,6 @@ use glam::{Vec3, Vec4};
 use scene_core::geometry::Aabb;
 use scene_core::light::{LightHull, LightPoint};
 
-use crate::tile_edges::LANES;
-
 /// λ is lowered by this, as a share of the axis' length.
 const TILT: f32 = 1.0 / 65_536.0;
 
@@ -81,22 +79,6 @@ impl Beam {
             planes[i] = plane(directions[i] - axis * (steepest[i] + TILT));
         }
         planes.iter().all(|plane| plane.is_finite()).then_some(Self { planes })
-    }
-}
-
-impl Beam {
-    /// Which of a vector of edges lie outside, given x, y and z of one end and of the other.
-    #[inline(always)]
-    pub(crate) fn outside(&self, [ax, ay, az, bx, by, bz]: &[[f32; LANES]; 6]) -> [bool; LANES] {
-        let mut outside = [false; LANES];
-        for plane in &self.planes {
-            for lane in 0..LANES {
-                let a = plane.x * ax[lane] + plane.y * ay[lane] + plane.z * az[lane] + plane.w;
-                let b = plane.x * bx[lane] + plane.y * by[lane] + plane.z * bz[lane] + plane.w;
-                outside[lane] |= (a > 0.0) & (b > 0.0);
-            }
-        }
-        outside
     }
 }
 

@@ -18,13 +18,14 @@
 //! Edges count as far as they lie above the receiver's plane (below, they are its own surface, and the light is above) and
 //! before the light. They are cut there.
 
-use fearless_simd::Simd;
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x16, mask32x16};
 use glam::{Mat3, Vec2, Vec3};
 use gnomon_shadow_map::light_cone::LightCone;
 use gnomon_shadow_map::light_maps::Receiver;
 use scene_core::light::LightPoint;
 
-use crate::tile_edges::{LANES, TileEdges};
+use crate::chosen::LANES;
+use crate::tile_edges::{TileEdges, cross, dot};
 
 /// A receiver, relative to the edges' origin, and the light over it.
 #[derive(Clone, Copy, Debug)]
@@ -79,6 +80,13 @@ impl Site {
         self.light_from_receiver * (point - self.point)
     }
 
+    /// (a, b, t) of a vector of points, counted from the receiver.
+    #[inline(always)]
+    pub(crate) fn locate_vector<S: Simd>(&self, from_receiver: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
+        let rows = self.light_from_receiver.transpose();
+        [dot(rows.x_axis, from_receiver), dot(rows.y_axis, from_receiver), dot(rows.z_axis, from_receiver)]
+    }
+
     /// The part of an edge, in (a, b, t), that lies above the receiver's plane, on the light's side of it and before the
     /// light.
     pub(crate) fn cut(&self, [a, b]: [Vec3; 2]) -> Option<[Vec3; 2]> {
@@ -115,18 +123,17 @@ pub(crate) fn center_is_left(a: Vec3, b: Vec3) -> bool {
     line.z > 0.0 || (line.z == 0.0 && (line.x > 0.0 || (line.x == 0.0 && line.y > 0.0)))
 }
 
-/// Edges of one vector, cut, in (a, b, t).
+/// An edge as points of the light are asked about it: it may lie over the light.
 #[derive(Clone, Copy, Debug)]
-struct Crossings {
-    /// (a, b) of both ends.
-    a: [[f32; LANES]; 2],
-    b: [[f32; LANES]; 2],
+struct Crossing {
+    /// (a, b) of both ends, cut.
+    ends: [[f32; 2]; 2],
     /// a × b.
-    line: [[f32; LANES]; 3],
-    /// What crossing one on the way from the centre adds; 0 for an edge that does not lie over the light.
-    step: [f32; LANES],
+    line: [f32; 3],
+    /// What crossing it on the way from the centre adds, never 0.
+    step: f32,
     /// Whether the centre lies left of it.
-    center_left: [bool; LANES],
+    center_left: bool,
 }
 
 /// Points of the light and what is counted at them; memory that is kept from receiver to receiver.
@@ -135,16 +142,13 @@ pub struct Counter {
     /// The points' a and b.
     xs: Vec<f32>,
     ys: Vec<f32>,
-    /// n(s) − n(c).
-    counts: Vec<f32>,
-    /// The edges as the light's points are asked about them.
-    crossings: Vec<Crossings>,
-    /// Edges that were cut and counted for the last receiver.
-    pub counted: u32,
+    /// The edges that may lie over the light of the receiver at hand.
+    crossings: Vec<Crossing>,
 }
 
 impl Counter {
     /// Takes the points of the light for the receivers to come.
+    #[inline(always)]
     pub fn set_points(&mut self, points: impl Iterator<Item = Vec2>) {
         self.xs.clear();
         self.ys.clear();
@@ -159,147 +163,146 @@ impl Counter {
         self.ys.resize(padded, last.1);
     }
 
+    /// Finds the edges that may lie over the light of a receiver: m(e) ≠ 0, not below its plane, and not beside the square
+    /// around the light (all tests are linear, so they are asked of the ends). Returns by how many faces they may change
+    /// the count at most.
+    #[inline(always)]
+    pub fn set_receiver<S: Simd>(&mut self, simd: S, site: &Site, edges: &TileEdges) -> f32 {
+        self.crossings.clear();
+        let mut most = 0.0;
+        for first in (0..edges.len()).step_by(LANES) {
+            most += find_crossings(simd, site, edges, first, &mut self.crossings);
+        }
+        most
+    }
+
     /// The share of the first `taps` points before which no face lies, if `at_center` lie before the centre.
     ///
     /// Counts below 0 would be a contradiction: `at_center` was found too small, and is raised.
     #[inline(always)]
-    pub fn visible<S: Simd>(
-        &mut self,
-        simd: S,
-        site: &Site,
-        edges: &TileEdges,
-        at_center: i32,
-        taps: usize,
-    ) -> f32 {
-        self.count(simd, site, edges);
-        let least = self.counts.iter().copied().fold(0.0, f32::min);
-        let clear = -(at_center as f32).max(-least);
-        let seen = self.counts[..taps].iter().map(|&count| u32::from(count == clear)).sum::<u32>();
+    pub fn visible<S: Simd>(&mut self, simd: S, at_center: i32, taps: usize) -> f32 {
+        let raised = at_center as f32;
+        // Without a contradiction −at_center is the count of clear points; with one the least count is.
+        let (mut least, mut of_least, mut clear) = (0.0f32, 0u32, 0u32);
+        for first in (0..taps).step_by(LANES) {
+            let counts = self.count(simd, first);
+            let valid = (1u64 << (taps - first).min(LANES)) - 1;
+            let found = counts.reduce_min();
+            if found < least {
+                (least, of_least) = (found, 0);
+            }
+            of_least += (counts.simd_eq(least).to_bitmask() & valid).count_ones();
+            clear += (counts.simd_eq(-raised).to_bitmask() & valid).count_ones();
+        }
+        let seen = if -least > raised { of_least } else { clear };
         seen as f32 / taps as f32
     }
 
+    /// n(s) − n(c) of a vector of points.
     #[inline(always)]
-    fn count<S: Simd>(&mut self, _simd: S, site: &Site, edges: &TileEdges) {
-        self.counts.clear();
-        self.counts.resize(self.xs.len(), 0.0);
-        self.counted = 0;
-        self.crossings.clear();
-        for first in (0..edges.len()).step_by(LANES) {
-            self.crossings.push(crossings(site, edges, first));
+    fn count<S: Simd>(&self, simd: S, first: usize) -> f32x16<S> {
+        let x = f32x16::from_slice(simd, &self.xs[first..first + LANES]);
+        let y = f32x16::from_slice(simd, &self.ys[first..first + LANES]);
+        let (nothing, mut counts) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0));
+        for &Crossing { ends: [a, b], line, step, center_left } in &self.crossings {
+            let sides = (x * a[1] - y * a[0]).simd_lt(0.0) ^ (x * b[1] - y * b[0]).simd_lt(0.0);
+            let left = (x * line[0] + y * line[1] + line[2]).simd_gt(0.0);
+            let crossed = sides & (left ^ mask32x16::splat(simd, center_left));
+            counts = counts + fearless_simd::Select::select(crossed, f32x16::splat(simd, step), nothing);
         }
-        for crossings in &self.crossings {
-            for lane in 0..LANES {
-                let step = crossings.step[lane];
-                if step == 0.0 {
-                    continue;
-                }
-                self.counted += 1;
-                let [[ax, ay], [bx, by]] =
-                    [&crossings.a, &crossings.b].map(|end| [end[0][lane], end[1][lane]]);
-                let [line_x, line_y, line_z] = [0, 1, 2].map(|i| crossings.line[i][lane]);
-                let center_left = crossings.center_left[lane];
-                let taps = self.xs.chunks_exact(LANES).zip(self.ys.chunks_exact(LANES));
-                for ((xs, ys), counts) in taps.zip(self.counts.chunks_exact_mut(LANES)) {
-                    for ((&x, &y), count) in xs.iter().zip(ys).zip(counts) {
-                        let sides = ((x * ay - y * ax) < 0.0) != ((x * by - y * bx) < 0.0);
-                        let left = (line_x * x + line_y * y + line_z) > 0.0;
-                        let crossed = sides & (left != center_left);
-                        *count += if crossed { step } else { 0.0 };
-                    }
-                }
-            }
-        }
+        counts
     }
 }
 
-/// Finds of one vector of edges those that may lie over the light: m(e) ≠ 0, not below the receiver's plane, and not beside
-/// the square around the light (all tests are linear, so they are asked of the ends); and cuts them as [`Site::cut`] does.
+/// [`Counter::set_receiver`] of one vector of edges; cuts them as [`Site::cut`] does.
 ///
 /// Sums are in the order of [`Site::locate`] and [`center_is_left`], of which faces ask the same.
 #[inline(always)]
-fn crossings(site: &Site, edges: &TileEdges, first: usize) -> Crossings {
+fn find_crossings<S: Simd>(
+    simd: S,
+    site: &Site,
+    edges: &TileEdges,
+    first: usize,
+    found: &mut Vec<Crossing>,
+) -> f32 {
     let Site { point, normal, tolerance, orientation, is_parallel, .. } = *site;
-    let m = site.light_from_receiver.transpose();
-    let part = |i: usize| edges.part(i, first);
-    let [ax, ay, az, bx, by, bz] = [0, 1, 2, 3, 4, 5].map(part);
-    let [px, py, pz, pd, qx, qy, qz, qd] = [6, 7, 8, 9, 10, 11, 12, 13].map(part);
-    let (p_sign, q_sign) = (part(14), part(15));
-    let mut all = Crossings {
-        a: [[0.0; LANES]; 2],
-        b: [[0.0; LANES]; 2],
-        line: [[0.0; LANES]; 3],
-        step: [0.0; LANES],
-        center_left: [false; LANES],
-    };
-    let mut counts = [false; LANES];
-    for lane in 0..LANES {
-        let from = [ax[lane] - point.x, ay[lane] - point.y, az[lane] - point.z];
-        let to = [bx[lane] - point.x, by[lane] - point.y, bz[lane] - point.z];
-        let heights = [dot(normal, from) - tolerance, dot(normal, to) - tolerance];
-        let mut a = [dot(m.x_axis, from), dot(m.y_axis, from), dot(m.z_axis, from)];
-        let mut b = [dot(m.x_axis, to), dot(m.y_axis, to), dot(m.z_axis, to)];
-        let beside = ((a[0] > a[2]) & (b[0] > b[2]))
-            | ((-a[0] > a[2]) & (-b[0] > b[2]))
-            | ((a[1] > a[2]) & (b[1] > b[2]))
-            | ((-a[1] > a[2]) & (-b[1] > b[2]));
-        let mut there = !beside;
-        let [x, y, z] = cross(a, b);
-        let center_left = (z > 0.0) | ((z == 0.0) & ((x > 0.0) | ((x == 0.0) & (y > 0.0))));
-        there &= keep(heights, &mut a, &mut b);
-        there &= keep([a[2], b[2]], &mut a, &mut b);
-        let before = [1.0 - a[2], 1.0 - b[2]];
-        there &= keep(if is_parallel { [1.0; 2] } else { before }, &mut a, &mut b);
-        for i in 0..2 {
-            (all.a[i][lane], all.b[i][lane]) = (a[i], b[i]);
-        }
-        for (all, line) in all.line.iter_mut().zip(cross(a, b)) {
-            all[lane] = line;
-        }
-        (all.center_left[lane], counts[lane]) = (center_left, there);
-    }
-    for lane in 0..LANES {
-        let side = |x: f32, y: f32, z: f32, d: f32, sign: f32| {
-            let at = x * point.x + y * point.y + z * point.z + d;
-            if at >= 0.0 { sign } else { -sign }
-        };
-        let multiplicity = side(px[lane], py[lane], pz[lane], pd[lane], p_sign[lane])
-            + side(qx[lane], qy[lane], qz[lane], qd[lane], q_sign[lane]);
-        let step = multiplicity * orientation * if all.center_left[lane] { -1.0 } else { 1.0 };
-        all.step[lane] = if counts[lane] { step } else { 0.0 };
-    }
+    let (from, to) = (edges.from(simd, first, 0, point), edges.from(simd, first, 3, point));
+    let heights = [dot(normal, from) - tolerance, dot(normal, to) - tolerance];
+    let (mut a, mut b) = (site.locate_vector(from), site.locate_vector(to));
+    let multiplicity = edges.multiplicity(simd, first, point);
+    let dead = beside([a[0], a[2]], [b[0], b[2]])
+        | beside([a[1], a[2]], [b[1], b[2]])
+        | multiplicity.simd_eq(0.0).to_bitmask();
+    let valid = (1u64 << (edges.len() - first).min(LANES)) - 1;
+    let mut there = !dead & valid;
     if edges.has_far() {
-        let [fx, fy, fz] = [16, 17, 18].map(part);
-        for lane in 0..LANES {
-            let far = [fx[lane] - point.x, fy[lane] - point.y, fz[lane] - point.z];
-            // NaN does not rise.
-            let rises = dot(normal, far) > tolerance;
-            all.step[lane] = if rises { 0.0 } else { all.step[lane] };
+        let far = edges.from(simd, first, 16, point);
+        // NaN does not rise.
+        there &= !dot(normal, far).simd_gt(tolerance).to_bitmask();
+    }
+    if there == 0 {
+        return 0.0;
+    }
+    let [x, y, z] = cross(a, b);
+    let center_left = is_left([x, y, z]);
+    there &= keep(heights, &mut a, &mut b);
+    there &= keep([a[2], b[2]], &mut a, &mut b);
+    if !is_parallel {
+        there &= keep([1.0 - a[2], 1.0 - b[2]], &mut a, &mut b);
+    }
+    if there == 0 {
+        return 0.0;
+    }
+    let [x, y, z] = cross(a, b);
+    let line = [x.to_array(), y.to_array(), z.to_array()];
+    let (a, b) = ([a[0].to_array(), a[1].to_array()], [b[0].to_array(), b[1].to_array()]);
+    let multiplicity = multiplicity.to_array();
+    let mut most = 0.0;
+    while there != 0 {
+        let lane = there.trailing_zeros() as usize % LANES;
+        there &= there - 1;
+        let center_left = center_left >> lane & 1 == 1;
+        let step = multiplicity[lane] * orientation * if center_left { -1.0 } else { 1.0 };
+        most += step.abs();
+        let ends = [[a[0][lane], a[1][lane]], [b[0][lane], b[1][lane]]];
+        found.push(Crossing { ends, line: line.map(|line| line[lane]), step, center_left });
+    }
+    most
+}
+
+/// Whether edges lie beyond t on one side of the square, given one coordinate and t of both ends; a bit each.
+#[inline(always)]
+fn beside<S: Simd>(a: [f32x16<S>; 2], b: [f32x16<S>; 2]) -> u64 {
+    let (above, below) =
+        (a[0].simd_gt(a[1]) & b[0].simd_gt(b[1]), (-a[0]).simd_gt(a[1]) & (-b[0]).simd_gt(b[1]));
+    (above | below).to_bitmask()
+}
+
+/// [`center_is_left`] of lines a × b, a bit each.
+#[inline(always)]
+pub(crate) fn is_left<S: Simd>([x, y, z]: [f32x16<S>; 3]) -> u64 {
+    let left = z.simd_gt(0.0).to_bitmask();
+    let ties = z.simd_eq(0.0).to_bitmask();
+    if ties == 0 {
+        return left;
+    }
+    let below = y.simd_gt(0.0).to_bitmask() & x.simd_eq(0.0).to_bitmask();
+    left | ties & (x.simd_gt(0.0).to_bitmask() | below)
+}
+
+/// Cuts off where `by` is not above 0. A bit for each edge of which something is left.
+#[inline(always)]
+fn keep<S: Simd>(by: [f32x16<S>; 2], a: &mut [f32x16<S>; 3], b: &mut [f32x16<S>; 3]) -> u64 {
+    let below = [by[0].simd_le(0.0), by[1].simd_le(0.0)];
+    if (below[0] | below[1]).to_bitmask() != 0 {
+        let share = by[0] / (by[0] - by[1]);
+        for (a, b) in a.iter_mut().zip(b) {
+            let cut = *a + (*b - *a) * share;
+            *a = fearless_simd::Select::select(below[0], cut, *a);
+            *b = fearless_simd::Select::select(below[1], cut, *b);
         }
     }
-    all
-}
-
-#[inline(always)]
-fn dot(axis: Vec3, v: [f32; 3]) -> f32 {
-    axis.x * v[0] + axis.y * v[1] + axis.z * v[2]
-}
-
-#[inline(always)]
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - b[1] * a[2], a[2] * b[0] - b[2] * a[0], a[0] * b[1] - b[0] * a[1]]
-}
-
-/// Cuts off where `by` is not above 0; false if nothing is left.
-#[inline(always)]
-fn keep(by: [f32; 2], a: &mut [f32; 3], b: &mut [f32; 3]) -> bool {
-    let below = by.map(|by| by <= 0.0);
-    let share = by[0] / (by[0] - by[1]);
-    for (a, b) in a.iter_mut().zip(b) {
-        let cut = *a + (*b - *a) * share;
-        *a = if below[0] { cut } else { *a };
-        *b = if below[1] { cut } else { *b };
-    }
-    !(below[0] & below[1])
+    !(below[0] & below[1]).to_bitmask()
 }
 
 #[cfg(test)]
@@ -332,7 +335,10 @@ mod tests {
         // Half a step inside, so that no point lies on an edge.
         let grid = |i: u32| Vec2::new((i % 32) as f32, (i / 32) as f32) / 16.0 + (1.0 / 32.0 - 1.0);
         counter.set_points((0..1024).map(grid));
-        dispatch!(Level::new(), simd => counter.visible(simd, &site, &tile, at_center, 1024))
+        dispatch!(Level::new(), simd => {
+            counter.set_receiver(simd, &site, &tile);
+            counter.visible(simd, at_center, 1024)
+        })
     }
 
     /// The receiver at x under a half-plane that ends at 0: the line through the edge meets the light at −3x, so that the

@@ -46,8 +46,13 @@ pub struct Faces {
 }
 
 impl Faces {
-    /// Lists the triangles of `casters` in a view.
-    pub fn new(scene: &Scene, casters: &[std::ops::Range<usize>], image: &LightImage) -> Self {
+    /// Lists the triangles of `casters` in a view, by the tiles of the grid that `grid_of` makes for so many.
+    pub fn new(
+        scene: &Scene,
+        casters: &[std::ops::Range<usize>],
+        image: &LightImage,
+        grid_of: impl Fn(usize) -> Grid,
+    ) -> Self {
         let triangles: Vec<u32> =
             casters.iter().flat_map(|range| range.clone()).map(|triangle| triangle as u32).collect();
         // Vertices are shared: each is placed once, and only those of the casters are asked.
@@ -56,7 +61,7 @@ impl Faces {
         } else {
             scene.positions().par_iter().map(|&position| image.place(position)).collect()
         };
-        let grid = Grid::of_texels(image.size, triangles.len());
+        let grid = grid_of(triangles.len());
         let lists = TileLists::new(grid, triangles.len(), |index, enter| {
             let corners = scene.triangles()[triangles[index] as usize];
             let (mut bounds, mut image_corners) = (Bounds::NONE, [Vec2::ZERO; 3]);

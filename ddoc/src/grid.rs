@@ -170,6 +170,17 @@ impl Grid {
         }
     }
 
+    /// Columns and rows of texels that a tile of the grid of `level` lies over: the first ones and those past the last, beside
+    /// the map, too.
+    pub fn texels_within(&self, level: u32, tile: u32) -> [std::ops::Range<i64>; 2] {
+        let side = self.tiles_at(level);
+        let width = i64::from(self.tile) << (RATIO * level);
+        [tile % side, tile / side].map(|at| {
+            let first = i64::from(at) * width - i64::from(self.margin);
+            first..first + width
+        })
+    }
+
     /// Tiles a side of the finest grid.
     pub fn tiles(&self) -> u32 {
         self.tiles

@@ -105,6 +105,21 @@ impl Layers {
         self.fragments.bytes() + size_of_val(&self.outlines[..]) + self.squares.bytes()
     }
 
+    /// Whether no face lies over these columns and rows of texels nor beside them, so that none counts before receivers there.
+    pub fn is_clear(&self, [columns, rows]: [std::ops::Range<i64>; 2]) -> bool {
+        let size = i64::from(self.image.size);
+        let within = |range: std::ops::Range<i64>| {
+            [(range.start - 1).clamp(0, size), (range.end + 1).clamp(0, size)].map(|at| at as usize)
+        };
+        let ([left, right], [top, bottom]) = (within(columns), within(rows));
+        let first = self.fragments.first();
+        self.fragments.is_empty()
+            || (top..bottom).all(|row| {
+                let line = row * self.image.size as usize;
+                first[line + left] == first[line + right]
+            })
+    }
+
     /// The texel that holds a place: column and row; `None` beside the map, where there is no caster.
     #[inline]
     fn texel(&self, place: Vec2) -> Option<[u32; 2]> {

@@ -1,7 +1,10 @@
 #![doc = include_str!("../README.md")]
 
 pub mod beam;
+mod block_faces;
+mod blocks;
 pub mod cells;
+mod chosen;
 pub mod coverage;
 pub mod cpu;
 pub mod discontinuity;
@@ -38,6 +41,7 @@ use scene_core::{GBuffer, Light, Origin, Report, Scene, VisibilityImage, relevan
 
 use discontinuity::Discontinuities;
 use faces::Faces;
+use grid::Grid;
 use layers::Layers;
 use light_image::LightImage;
 pub use params::{DdocParams, Variant};
@@ -66,6 +70,8 @@ pub struct PreparedDdoc<'a> {
     first_outline: usize,
     /// Bounds of the light; none of a sun that is too wide.
     hull: Option<LightHull>,
+    /// Those of its centre.
+    center_hull: Option<LightHull>,
     /// Points of the light as shares of it.
     points: Vec<Vec2>,
     variant: Variant,
@@ -86,6 +92,16 @@ impl Ddoc {
         &self,
         scene: &'a Scene,
         light: &Light,
+    ) -> Result<(PreparedDdoc<'a>, Report), TopologyError> {
+        self.prepare_with(scene, light, !self.params.skip)
+    }
+
+    /// [`prepare`](Self::prepare), with the faces that each texel lists if `by_texels`.
+    fn prepare_with<'a>(
+        &self,
+        scene: &'a Scene,
+        light: &Light,
+        by_texels: bool,
     ) -> Result<(PreparedDdoc<'a>, Report), TopologyError> {
         let (mut report, params) = (Report::default(), &self.params);
         let tolerance = plane_tolerance(scene.bounds(), light);
@@ -108,20 +124,26 @@ impl Ddoc {
         };
         let (faces, mut layers) = report.time("prepare.map", |_| {
             let solid = of(true);
-            let faces: Vec<_> = images.iter().map(|image| Faces::new(scene, &solid, image)).collect();
+            let lone = images.len() == 1;
+            // Blocks of receivers choose faces as they choose edges, by tiles; one receiver alone asks all over its texel.
+            let grid_of = |size: u32, count: usize| {
+                if by_texels { Grid::of_texels(size, count) } else { Grid::new(size, lone) }
+            };
+            let of_view =
+                |image: &LightImage| Faces::new(scene, &solid, image, |count| grid_of(image.size, count));
+            let faces: Vec<_> = images.iter().map(of_view).collect();
             (faces, cpu::draw_layers(scene, &of(false), &images, single))
         });
         let bounds = casters.drawn.iter().fold(Aabb::EMPTY, |all, object| all.union(object.bounds));
         let origin = if bounds.is_empty() { Vec3::ZERO } else { bounds.center() };
-        let hull = LightHull::of(light);
+        let (hull, center_hull) = (LightHull::of(light), LightHull::of(&center.as_light()));
         let (edges, first_outline) = report.time("prepare.silhouettes", |report| {
             let mut edges = match params.variant {
                 Variant::ImageEdges | Variant::Paper => Vec::new(),
                 Variant::Ddoc => object_edges(scene, &casters.drawn, origin, hull.as_ref(), center, report)?,
                 Variant::Smoothies | Variant::PenumbraMap => {
-                    let point = LightHull::of(&center.as_light());
                     let mut edges =
-                        object_edges(scene, &casters.drawn, origin, point.as_ref(), center, report)?;
+                        object_edges(scene, &casters.drawn, origin, center_hull.as_ref(), center, report)?;
                     edges.retain(|edge| edge.from_center != 0);
                     edges
                 }
@@ -155,8 +177,19 @@ impl Ddoc {
         };
         let points = light_points::light_points(light, params.taps, params.seed);
         let DdocParams { variant, skip, .. } = *params;
-        let prepared =
-            PreparedDdoc { base, faces, layers, origin, edges, first_outline, hull, points, variant, skip };
+        let prepared = PreparedDdoc {
+            base,
+            faces,
+            layers,
+            origin,
+            edges,
+            first_outline,
+            hull,
+            center_hull,
+            points,
+            variant,
+            skip,
+        };
         Ok((prepared, report))
     }
 }

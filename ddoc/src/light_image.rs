@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use gnomon_shadow_map::light_views::LightView;
+use scene_core::geometry::Aabb;
 use scene_core::light::LightPoint;
 
 /// Steps a texel that the rasteriser snaps vertices to: coverage is decided on them.
@@ -82,6 +83,14 @@ impl LightImage {
     #[inline]
     pub fn weight(&self, point: Vec3) -> f32 {
         self.view.projection_from_world.row(3).dot(point.extend(1.0))
+    }
+
+    /// Whether all of a box, which is relative to `origin`, lies before the light, beyond any rounding.
+    pub fn is_before(&self, bounds: &Aabb, origin: Vec3) -> bool {
+        let weights = bounds.corners().map(|corner| self.weight(corner + origin));
+        let (least, most) =
+            weights.iter().fold((f32::INFINITY, 0.0f32), |(least, most), &w| (least.min(w), most.max(w)));
+        least > most * (1.0 / 4096.0)
     }
 
     /// The change of [`along`](Self::along) with a direction.

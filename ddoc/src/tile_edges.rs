@@ -1,19 +1,19 @@
-//! The edges that a tile's receivers are asked about, component by component, and the choice of those that reach into a beam.
+//! The edges that a block's receivers are asked about, component by component.
 
-use fearless_simd::Simd;
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
 use glam::Vec3;
+use gnomon_shadow_map::light_maps::Receiver;
 
-use crate::beam::Beam;
+use crate::chosen::LANES;
 use crate::silhouettes::Edge;
 
-/// Lanes that the compiler is given to fill.
-pub(crate) const LANES: usize = 16;
+/// Numbers an edge: a, b, the two planes, the two signs; the point seen past the edge.
+const PARTS: usize = 19;
 
-/// Edges of a tile, component by component.
+/// Edges of a block, component by component.
 #[derive(Debug, Default)]
 pub struct TileEdges {
-    /// a, b, the two planes, the two signs; the point seen past the edge.
-    parts: [Vec<f32>; 19],
+    parts: [Vec<f32>; PARTS],
     count: usize,
     has_far: bool,
 }
@@ -48,77 +48,77 @@ impl TileEdges {
         self.parts.iter_mut().for_each(|part| part.resize(padded, 0.0));
     }
 
-    /// Takes over those of `edges` that `indices` name, or of them those that [`Beam`] lets through, and fills the last lanes.
-    #[inline(always)]
-    pub fn gather<S: Simd>(
-        &mut self,
-        _simd: S,
-        edges: &[Edge],
-        mut indices: impl Iterator<Item = u32>,
-        beam: Option<&Beam>,
-    ) {
+    /// Takes over those of `edges` that are named, and fills the last lanes.
+    pub fn gather(&mut self, edges: &[Edge], indices: impl Iterator<Item = u32>) {
         self.clear();
-        let (mut chunk, mut ends) = ([0u32; LANES], [[0.0f32; LANES]; 6]);
-        loop {
-            let mut count = 0;
-            while count < LANES
-                && let Some(index) = indices.next()
-            {
-                let Edge { a, b, .. } = edges[index as usize];
-                for (part, value) in ends.iter_mut().zip([a.x, a.y, a.z, b.x, b.y, b.z]) {
-                    part[count] = value;
-                }
-                chunk[count] = index;
-                count += 1;
-            }
-            let outside = beam.map_or([false; LANES], |beam| beam.outside(&ends));
-            for (&index, _) in chunk[..count].iter().zip(&outside).filter(|(_, outside)| !**outside) {
-                self.push(&edges[index as usize]);
-            }
-            if count < LANES {
-                break;
-            }
-        }
+        indices.for_each(|index| self.push(&edges[index as usize]));
         self.pad();
     }
 
-    /// Takes over those of `other` that `beam` lets through, and fills the last lanes.
+    /// Keeps the edges that may count for some of the receivers: those that rise above its plane and, where it is `silhouettes`
+    /// that count, are one as it sees them. Each is asked as [`Counter`](crate::coverage::Counter) asks: what is left out
+    /// would have counted for nobody.
     #[inline(always)]
-    pub fn take_within<S: Simd>(&mut self, _simd: S, other: &Self, beam: &Beam) {
-        self.clear();
-        self.has_far = other.has_far;
-        // Without points seen past edges nothing asks for theirs.
-        let told = if other.has_far { 19 } else { 16 };
-        let padded = other.parts[0].len();
-        // A vector is written whole wherever those before it ended.
-        self.parts.iter_mut().for_each(|part| part.resize(padded + LANES, 0.0));
-        for first in (0..padded).step_by(LANES) {
-            let mut ends = [[0.0; LANES]; 6];
-            for (to, from) in ends.iter_mut().zip(&other.parts) {
-                to.copy_from_slice(&from[first..first + LANES]);
-            }
-            let outside = beam.outside(&ends);
-            let (mut kept, mut count) = ([0u8; LANES], 0);
-            for (lane, &outside) in (0u8..).zip(&outside).take(other.count - first.min(other.count)) {
-                kept[count] = lane;
-                count += usize::from(!outside);
-            }
-            if count == 0 {
-                continue;
-            }
-            for (to, from) in self.parts.iter_mut().zip(&other.parts).take(told) {
-                let mut vector = [0.0; LANES];
-                vector.copy_from_slice(&from[first..first + LANES]);
-                let to = &mut to[self.count..self.count + LANES];
-                for (to, &lane) in to.iter_mut().zip(&kept) {
-                    *to = vector[usize::from(lane) % LANES];
+    pub(crate) fn keep_for<S: Simd>(
+        &mut self,
+        simd: S,
+        receivers: &[(u32, Receiver)],
+        origin: Vec3,
+        silhouettes: bool,
+    ) {
+        let mut kept = 0;
+        for first in (0..self.count).step_by(LANES) {
+            let valid = (1u64 << (self.count - first).min(LANES)) - 1;
+            let mut counts = 0;
+            for (_, receiver) in receivers {
+                let point = receiver.point - origin;
+                let from = self.from(simd, first, 0, point);
+                let to = self.from(simd, first, 3, point);
+                let a = dot(receiver.normal, from) - receiver.tolerance;
+                let b = dot(receiver.normal, to) - receiver.tolerance;
+                let mut bits = !(a.simd_le(0.0) & b.simd_le(0.0)).to_bitmask();
+                if silhouettes {
+                    bits &= !self.multiplicity(simd, first, point).simd_eq(0.0).to_bitmask();
+                }
+                counts |= bits;
+                if counts & valid == valid {
+                    break;
                 }
             }
-            self.count += count;
+            let mut bits = counts & valid;
+            while bits != 0 {
+                let lane = first + bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                self.parts.iter_mut().for_each(|part| part[kept] = part[lane]);
+                kept += 1;
+            }
         }
-        let count = self.count;
-        self.parts.iter_mut().for_each(|part| part.truncate(count));
+        self.count = kept;
+        self.parts.iter_mut().for_each(|part| part.truncate(kept));
         self.pad();
+    }
+
+    /// Corners of a vector of edges, whose x has the number `kind`, counted from a point.
+    #[inline(always)]
+    pub(crate) fn from<S: Simd>(&self, simd: S, first: usize, kind: usize, point: Vec3) -> [f32x16<S>; 3] {
+        let (x, y) = (self.part(simd, kind, first), self.part(simd, kind + 1, first));
+        [x - point.x, y - point.y, self.part(simd, kind + 2, first) - point.z]
+    }
+
+    /// m(e) of a vector of edges as seen from a point.
+    #[inline(always)]
+    pub(crate) fn multiplicity<S: Simd>(&self, simd: S, first: usize, point: Vec3) -> f32x16<S> {
+        self.side(simd, first, 6, 14, point) + self.side(simd, first, 10, 15, point)
+    }
+
+    /// sign(e, f)·side(f, p) of the faces whose planes begin at `plane`, and whose signs are `sign`.
+    #[inline(always)]
+    fn side<S: Simd>(&self, simd: S, first: usize, plane: usize, sign: usize, point: Vec3) -> f32x16<S> {
+        let (x, y) = (self.part(simd, plane, first), self.part(simd, plane + 1, first));
+        let (z, d) = (self.part(simd, plane + 2, first), self.part(simd, plane + 3, first));
+        let at = x * point.x + y * point.y + z * point.z + d;
+        let sign = self.part(simd, sign, first);
+        fearless_simd::Select::select(at.simd_ge(0.0), sign, -sign)
     }
 
     /// The ends of an edge.
@@ -130,8 +130,8 @@ impl TileEdges {
 
     /// A vector of the numbers of one kind, from edge `first` on.
     #[inline(always)]
-    pub(crate) fn part(&self, kind: usize, first: usize) -> &[f32] {
-        &self.parts[kind][first..first + LANES]
+    fn part<S: Simd>(&self, simd: S, kind: usize, first: usize) -> f32x16<S> {
+        f32x16::from_slice(simd, &self.parts[kind][first..first + LANES])
     }
 
     /// Whether of some a point seen past them is known.
@@ -150,4 +150,16 @@ impl TileEdges {
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
+}
+
+/// The product of an axis with a vector of vectors, summed as glam does.
+#[inline(always)]
+pub(crate) fn dot<S: Simd>(axis: Vec3, v: [f32x16<S>; 3]) -> f32x16<S> {
+    v[0] * axis.x + v[1] * axis.y + v[2] * axis.z
+}
+
+/// a × b, summed as glam does.
+#[inline(always)]
+pub(crate) fn cross<S: Simd>(a: [f32x16<S>; 3], b: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    [a[1] * b[2] - b[1] * a[2], a[2] * b[0] - b[2] * a[0], a[0] * b[1] - b[0] * a[1]]
 }

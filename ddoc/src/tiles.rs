@@ -81,25 +81,14 @@ impl Tiles {
         Self { of, farthest, per_view, grid }
     }
 
-    /// View and tile of a receiver; `None` if its V is known.
-    #[inline]
-    pub fn of(&self, receiver: usize) -> Option<(usize, u32)> {
-        let of = self.of[receiver];
-        (of != NONE).then(|| ((of / self.per_view) as usize, of % self.per_view))
-    }
-
-    /// The receivers whose tile of the finest grid `takes` chooses, sorted by tiles of the grid of `level`; in a tile in
-    /// their own order.
-    pub fn sorted(&self, level: u32, takes: impl Fn(usize, u32) -> bool) -> (Vec<u32>, Vec<TileReceivers>) {
+    /// The receivers that have a tile, sorted by tiles of the grid of `level`; in a tile in their own order.
+    pub fn sorted(&self, level: u32) -> (Vec<u32>, Vec<TileReceivers>) {
         let (side, side_above) = (self.grid.tiles(), self.grid.tiles_at(level));
         let per_view = side_above * side_above;
         // Of each tile of the finest grid the one above it.
         let above: Vec<u32> = (0..self.farthest.len() as u32 * self.per_view)
             .map(|of| {
                 let (view, tile) = (of / self.per_view, of % self.per_view);
-                if !takes(view as usize, tile) {
-                    return NONE;
-                }
                 let [column, row] = [tile % side, tile / side].map(|at| at >> (RATIO * level));
                 view * per_view + row * side_above + column
             })

@@ -126,7 +126,7 @@ impl DdocOnGpu {
         })?;
         let (prepared, mut report) = self
             .technique
-            .prepare(geometry, query.light)
+            .prepare_with(geometry, query.light, true)
             .map_err(|error| TechniqueError::Other(Box::new(error)))?;
         GpuError::within("views of a light", prepared.layers.len() as u32, MOST_VIEWS as u32)?;
         let splats = report.time("prepare.splat", |report| {

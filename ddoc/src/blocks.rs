@@ -1,0 +1,263 @@
+//! `shade.penumbra`: a tile's receivers, block by block.
+//!
+//! A tile of the light's image holds receivers at many depths, with edges and faces for all of them. Its receivers are cut into
+//! blocks of neighbours, and each block chooses from the edges and faces of the one that it is a part of those that reach
+//! into its beam ([`beam`](crate::beam)), until few are left. Then
+//!
+//! - a block that no edge reaches has no penumbra: with no face before any of its receivers, or one before all, it is answered
+//!   as a whole, or else by faces alone, the hard test;
+//! - of the others each receiver asks the edges and faces that are left, sixteen at a time.
+//!
+//! Whatever is left out would not have counted, so that the image is the same without blocks (`skip` off).
+
+use fearless_simd::Simd;
+use gnomon_shadow_map::light_cone::LightCone;
+use gnomon_shadow_map::light_maps::Receiver;
+use scene_core::Light;
+use scene_core::geometry::Aabb;
+
+use crate::beam::Beam;
+use crate::block_faces::{Before, BlockFaces};
+use crate::chosen::Chosen;
+use crate::coverage::{Counter, Site};
+use crate::cpu::{before_center, by_map, site_of};
+use crate::grid::TileLists;
+use crate::outer::{self, Kept};
+use crate::params::Variant;
+use crate::tile_edges::TileEdges;
+use crate::{PreparedDdoc, paper};
+
+/// Receivers of a block that is not cut again: to choose edges costs as much as asking some receivers about all of them.
+const FEW_RECEIVERS: usize = 8;
+
+/// Receivers of a block with edges at most.
+const MOST_RECEIVERS: usize = 64;
+
+/// Edges from which none are chosen: as many as a vector has lanes; and faces.
+const FEW_EDGES: usize = 16;
+const FEW_FACES: usize = 32;
+
+/// What a thread keeps from tile to tile.
+#[derive(Default)]
+pub(crate) struct Thread {
+    /// Edges and faces of the tile, and after them those of a block, of a part of that block, and so on.
+    chosen: Vec<(Chosen<6>, Chosen<9>)>,
+    /// Those that the block at hand is asked about.
+    edges: TileEdges,
+    faces: BlockFaces,
+    /// The tile's edges by index.
+    indices: Vec<u32>,
+    /// The tile's receivers, and where their values go.
+    receivers: Vec<(u32, Receiver)>,
+    seen_edges: Seen,
+    seen_faces: Seen,
+    /// Blocks to come.
+    blocks: Vec<Block>,
+    counter: Counter,
+    /// Whether the counter's points are those of all receivers.
+    has_points: bool,
+    /// Receivers without an edge.
+    pub(crate) without_edge: u64,
+}
+
+/// Things of the tile at hand: lists of several tiles may name one more than once.
+#[derive(Default)]
+struct Seen {
+    /// The tile, counted from 1, that a thing was last found in.
+    of: Vec<u32>,
+    turn: u32,
+}
+
+impl Seen {
+    fn begin(&mut self, count: usize) {
+        self.of.resize(count, 0);
+        self.turn += 1;
+    }
+
+    #[inline(always)]
+    fn is_new(&mut self, index: u32) -> bool {
+        std::mem::replace(&mut self.of[index as usize], self.turn) != self.turn
+    }
+}
+
+/// Neighbouring receivers of a tile.
+struct Block {
+    receivers: std::ops::Range<usize>,
+    /// Where the edges and faces are of the block that it is a part of.
+    part_of: Option<usize>,
+}
+
+/// What a tile's receivers are answered from.
+pub(crate) struct Tile<'p, 'a> {
+    pub(crate) prepared: &'p PreparedDdoc<'a>,
+    pub(crate) view: usize,
+    pub(crate) splats: &'p TileLists,
+    /// The grid that receivers are sorted by, and the tile of it.
+    pub(crate) level: u32,
+    pub(crate) tile: u32,
+}
+
+/// V of a tile's `receivers`, in their order.
+#[inline(always)]
+pub(crate) fn shade_tile<S: Simd>(
+    simd: S,
+    tile: &Tile<'_, '_>,
+    receivers: &[u32],
+    thread: &mut Thread,
+    site: &(impl Fn(usize) -> Result<Receiver, f32> + Sync),
+) -> Vec<f32> {
+    let prepared = tile.prepared;
+    let mut values = vec![0.0; receivers.len()];
+    thread.receivers.clear();
+    for (slot, &index) in receivers.iter().enumerate() {
+        match site(index as usize) {
+            Ok(receiver) => thread.receivers.push((slot as u32, receiver)),
+            Err(known) => values[slot] = known,
+        }
+    }
+    if prepared.skip && prepared.variant != Variant::Paper {
+        shade_blocks(simd, tile, thread, &mut values);
+    } else {
+        thread.indices.clear();
+        thread.indices.extend(tile.splats.of(tile.tile));
+        thread.edges.gather(&prepared.edges, thread.indices.iter().copied());
+        if thread.edges.is_empty() {
+            thread.without_edge += thread.receivers.len() as u64;
+        }
+        for index in 0..thread.receivers.len() {
+            let (slot, receiver) = thread.receivers[index];
+            let (site, cone) = site_of(prepared, &receiver);
+            let at_center = before_center(prepared, tile.view, &receiver, &site);
+            values[slot as usize] = tile.answer(simd, &receiver, (&site, cone), at_center, thread);
+        }
+    }
+    values
+}
+
+#[inline(always)]
+fn shade_blocks<S: Simd>(simd: S, tile: &Tile<'_, '_>, thread: &mut Thread, values: &mut [f32]) {
+    let Tile { prepared, view, splats, level, tile: number } = *tile;
+    let (scene, light, origin) = (prepared.base.scene.as_ref(), &prepared.base.light, prepared.origin);
+    let (layers, lists) = (&prepared.layers[view], prepared.faces[view].lists());
+    let by_map_too = !layers.is_clear(splats.grid().texels_within(level, number));
+    let silhouettes = !matches!(prepared.variant, Variant::Smoothies | Variant::PenumbraMap);
+    thread.seen_edges.begin(prepared.edges.len());
+    thread.seen_faces.begin(scene.triangles().len());
+    thread.blocks.clear();
+    thread.blocks.push(Block { receivers: 0..thread.receivers.len(), part_of: None });
+    while let Some(Block { receivers, part_of }) = thread.blocks.pop() {
+        let held = &mut thread.receivers[receivers.clone()];
+        let bounds = Aabb::from_points(held.iter().map(|(_, receiver)| receiver.point - origin));
+        let beam = |hull: Option<_>| hull.and_then(|hull| Beam::new(&bounds, hull, origin));
+        let (to_light, to_center) = (beam(prepared.hull.as_ref()), beam(prepared.center_hull.as_ref()));
+        // Those of a part lie one place above those of the whole.
+        let place = part_of.map_or(0, |whole| whole + 1);
+        if thread.chosen.len() == place {
+            thread.chosen.push(Default::default());
+        }
+        let (below, above) = thread.chosen.split_at_mut(place);
+        let (edges, faces) = &mut above[0];
+        if let Some((edges_below, faces_below)) = below.last() {
+            edges.take_within(simd, edges_below, to_light.as_ref());
+            faces.take_within(simd, faces_below, to_center.as_ref());
+        } else {
+            let (seen_edges, seen_faces) = (&mut thread.seen_edges, &mut thread.seen_faces);
+            let new = splats.of_all_within(level, number).filter(|&index| seen_edges.is_new(index));
+            let ends = |index: u32| {
+                let edge = &prepared.edges[index as usize];
+                [edge.a.x, edge.a.y, edge.a.z, edge.b.x, edge.b.y, edge.b.z]
+            };
+            edges.gather(simd, new, ends, to_light.as_ref());
+            let new = lists.of_all_within(level, number).filter(|&index| seen_faces.is_new(index));
+            let corners = |index: u32| {
+                let [a, b, c] = scene.corners(index as usize).map(|corner| corner - origin);
+                [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z]
+            };
+            faces.gather(simd, new, corners, to_center.as_ref());
+        }
+        let is_small = held.len() <= FEW_RECEIVERS
+            || edges.len() <= FEW_EDGES
+                && faces.len() <= FEW_FACES
+                && (edges.len() == 0 || held.len() <= MOST_RECEIVERS);
+        // Without a beam no part has less than the whole.
+        if !is_small && to_light.is_some() {
+            let (middle, axis) = (held.len() / 2, bounds.size().max_position());
+            held.select_nth_unstable_by(middle, |(_, a), (_, b)| a.point[axis].total_cmp(&b.point[axis]));
+            let middle = receivers.start + middle;
+            thread.blocks.push(Block { receivers: middle..receivers.end, part_of: Some(place) });
+            thread.blocks.push(Block { receivers: receivers.start..middle, part_of: Some(place) });
+            continue;
+        }
+        let held = &thread.receivers[receivers.clone()];
+        thread.edges.gather(&prepared.edges, edges.indices().iter().copied());
+        thread.edges.keep_for(simd, held, origin, silhouettes);
+        thread.faces.gather(scene, faces.indices().iter().copied(), origin, light.center());
+        let before = thread.faces.keep_for(simd, held, &bounds, (light, origin));
+        if thread.edges.is_empty() {
+            thread.without_edge += held.len() as u64;
+            // Behind the light's plane nothing is taken to lie before the centre.
+            let known = match before {
+                Before::None => Some(1.0),
+                Before::All if layers.image.is_before(&bounds, origin) => Some(0.0),
+                _ => None,
+            };
+            if let Some(v) = known.filter(|_| !by_map_too) {
+                held.iter().for_each(|(slot, _)| values[*slot as usize] = v);
+                continue;
+            }
+        }
+        for index in receivers {
+            let (slot, receiver) = thread.receivers[index];
+            let (site, cone) = site_of(prepared, &receiver);
+            let mut at_center = 0;
+            if let Some(place) = layers.image.place(receiver.point) {
+                at_center = thread.faces.before(simd, &receiver, &site);
+                if by_map_too {
+                    at_center += by_map(prepared, view, &receiver, place);
+                }
+            }
+            values[slot as usize] = tile.answer(simd, &receiver, (&site, cone), at_center, thread);
+        }
+    }
+}
+
+impl Tile<'_, '_> {
+    /// V of a receiver, if `at_center` faces lie between it and the light's centre, from the edges at hand.
+    #[inline(always)]
+    fn answer<S: Simd>(
+        &self,
+        simd: S,
+        receiver: &Receiver,
+        (site, cone): (&Site, Option<LightCone>),
+        at_center: i32,
+        thread: &mut Thread,
+    ) -> f32 {
+        let (prepared, edges) = (self.prepared, &thread.edges);
+        let light = &prepared.base.light;
+        let hard = if at_center > 0 { 0.0 } else { 1.0 };
+        let Some(cone) = cone else { return hard };
+        match prepared.variant {
+            Variant::Ddoc | Variant::ImageEdges => {
+                let most = thread.counter.set_receiver(simd, site, edges);
+                // The count is the same before all points, or above 0 before all.
+                if most == 0.0 || most < at_center as f32 {
+                    return hard;
+                }
+                // Only on a sphere do the points differ from receiver to receiver.
+                if !thread.has_points || matches!(light, Light::Sphere { .. }) {
+                    thread.counter.set_points(prepared.points.iter().map(|&point| cone.share(point)));
+                    thread.has_points = true;
+                }
+                thread.counter.visible(simd, at_center, prepared.points.len())
+            }
+            Variant::Smoothies => outer::visible(Kept::Nearest, site, edges, hard),
+            Variant::PenumbraMap => outer::visible(Kept::Darkest, site, edges, hard),
+            Variant::Paper => {
+                let edges = thread.indices.iter().map(|&edge| (edge, &prepared.edges[edge as usize]));
+                let (image, points) = (&prepared.layers[self.view].image, &prepared.points);
+                let light = (light, prepared.hull.as_ref());
+                paper::visible(light, image, receiver, prepared.origin, edges, points, hard)
+            }
+        }
+    }
+}
