@@ -12,7 +12,7 @@
 //! of products of f32, good to 2⁻²² of their terms, are then good to 2⁻¹⁶. A sign is taken to be known beyond 2⁻¹² of the
 //! terms.
 
-use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x16};
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
 use glam::Vec3;
 use gnomon_shadow_map::light_maps::Receiver;
 use scene_core::geometry::Aabb;
@@ -80,11 +80,6 @@ impl BlockFaces {
     fn pad(&mut self) {
         let padded = self.count.next_multiple_of(LANES);
         self.parts.iter_mut().for_each(|part| part.resize(padded, 0.0));
-    }
-
-    /// Whether there are none.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.count == 0
     }
 
     /// Keeps the faces that may count before some of the receivers, whose box, relative to the origin, is `bounds`.
