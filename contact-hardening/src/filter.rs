@@ -175,16 +175,25 @@ impl Asker<'_> {
             let above = (located.z / t).ln();
             // The search finds some blockers: others may be nearer than the first layer, where they stand in the cone,
             // or beyond the last.
-            let reaches_down = |slack: f32| above >= -slack || is_first && self.site.cone.contains(located);
+            let stands_in_cone = || is_first && self.site.cone.contains(located);
             let is_within = if half.is_infinite() {
                 // One layer is asked for all, but what a pixel holds may lie behind the receiver.
                 located.z > 0.0
-            } else if reaches_down(half) {
+            } else if above >= 0.0 && (above <= half || is_last) {
+                // The layer lies in the window, or below the last: whatever the far side is.
+                true
+            } else if above >= -half || stands_in_cone() {
                 // From its far side to the near one a blocker is passed; a thinner one than a step is widened to a step, for no
                 // layer may lie within. A layer that lies on a side of one holds it, however it is rounded.
-                let back = (self.lines.far_side(&blocker).max(f32::MIN_POSITIVE) / t).ln();
-                let slack = (half - 0.5 * (above - back)).max(half.min(CLOSE));
-                reaches_down(slack) && (back <= slack || is_last)
+                let back = || (self.lines.far_side(&blocker).max(f32::MIN_POSITIVE) / t).ln();
+                let slack = |back: f32| (half - 0.5 * (above - back)).max(half.min(CLOSE));
+                if above > half {
+                    let back = back();
+                    back <= slack(back)
+                } else {
+                    // The far side is farther down still.
+                    stands_in_cone() || above >= -slack(back())
+                }
             } else {
                 false
             };
