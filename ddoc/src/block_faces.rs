@@ -198,7 +198,7 @@ impl BlockFaces {
                 let (p, q) = (along[next] * way[last], along[last] * way[next]);
                 let (normal, terms) = (p - q, p.abs() + q.abs());
                 let from = middle[axis] - a[axis];
-                value = value + normal * from;
+                value += normal * from;
                 reach = reach + normal.abs() * half[axis] + terms * KNOWN * (from.abs() + half[axis]);
             }
             positive[side] = value.simd_gt(reach).to_bitmask();

@@ -208,7 +208,7 @@ impl Counter {
             let sides = (x * a[1] - y * a[0]).simd_lt(0.0) ^ (x * b[1] - y * b[0]).simd_lt(0.0);
             let left = (x * line[0] + y * line[1] + line[2]).simd_gt(0.0);
             let crossed = sides & (left ^ mask32x16::splat(simd, center_left));
-            counts = counts + fearless_simd::Select::select(crossed, f32x16::splat(simd, step), nothing);
+            counts += fearless_simd::Select::select(crossed, f32x16::splat(simd, step), nothing);
         }
         counts
     }
