@@ -2,10 +2,9 @@
 
 mod truth;
 
-use glam::Vec3;
 use gnomon_penumbra_wedges::{Casters, Variant};
-use scene_core::{Light, scenes};
-use truth::{camera, cube, rmse, scene_of, sheet};
+use scene_core::scenes;
+use truth::{known_errors, rmse};
 
 const ALL: [Variant; 3] = [Variant::Interpolated, Variant::Coverage, Variant::Exact];
 
@@ -32,18 +31,8 @@ fn exact_is_right_on_every_built_in_scene() {
 /// light is taken from its middle.
 #[test]
 fn the_known_errors_of_coverage_are_not_those_of_exact() {
-    let floor = sheet(0.0, [-5.0, -5.0], [5.0, 5.0]);
-    let view = camera(Vec3::new(1.5, 4.0, 6.0), Vec3::new(0.0, 0.2, 0.0), 128, 96);
-    let light = Light::Rect { center: Vec3::Y * 4.0, half_u: Vec3::X, half_v: Vec3::Z };
-    let overlap = scene_of(&[
-        floor.clone(),
-        sheet(1.0, [-1.0, -1.0], [1.0, 1.0]),
-        sheet(1.2, [-0.93, -0.93], [0.93, 0.93]),
-    ]);
-    // A tall box under a wide light: from its border three faces are seen, from above one.
-    let wide = Light::Rect { center: Vec3::Y * 4.0, half_u: Vec3::X * 2.5, half_v: Vec3::Z * 2.5 };
-    let changing = scene_of(&[floor, cube(Vec3::new(0.0, 1.5, 0.0), 1.0)]);
-    for (what, scene, light) in [("overlap", &overlap, &light), ("changing silhouette", &changing, &wide)] {
+    let (scenes, view) = known_errors();
+    for (what, scene, light) in &scenes {
         let errors = rmse(scene, light, &view, &ALL, 1024);
         println!("{what}: {errors:.4?}");
         let [_, coverage, exact] = errors[..] else { panic!("three variants") };

@@ -94,3 +94,19 @@ pub(crate) fn rmse(
     };
     variants.iter().map(error).collect()
 }
+
+/// Scenes made for what `coverage` does not know, with their camera: two sheets that hide the same part of the light count twice;
+/// and of a tall box under a wide light three faces are seen from its border, from above one.
+pub(crate) fn known_errors() -> ([(&'static str, Scene, Light); 2], Camera) {
+    let floor = sheet(0.0, [-5.0, -5.0], [5.0, 5.0]);
+    let light =
+        |half: f32| Light::Rect { center: Vec3::Y * 4.0, half_u: Vec3::X * half, half_v: Vec3::Z * half };
+    let overlap = scene_of(&[
+        floor.clone(),
+        sheet(1.0, [-1.0, -1.0], [1.0, 1.0]),
+        sheet(1.2, [-0.93, -0.93], [0.93, 0.93]),
+    ]);
+    let changing = scene_of(&[floor, cube(Vec3::new(0.0, 1.5, 0.0), 1.0)]);
+    let view = camera(Vec3::new(1.5, 4.0, 6.0), Vec3::new(0.0, 0.2, 0.0), 128, 96);
+    ([("overlap", overlap, light(1.0)), ("changing silhouette", changing, light(2.5))], view)
+}
