@@ -19,7 +19,7 @@ use scene_core::geometry::Aabb;
 use scene_core::light::LightPoint;
 use scene_core::{Light, Scene};
 
-use crate::chosen::LANES;
+use crate::chosen::{LANES, keep_lanes};
 use crate::coverage::{Site, is_left};
 use crate::tile_edges::cross;
 
@@ -114,13 +114,7 @@ impl BlockFaces {
                 }
             }
             covers |= all & inside & asked != 0;
-            let mut bits = any & asked;
-            while bits != 0 {
-                let lane = first + bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                self.parts.iter_mut().for_each(|part| part[kept] = part[lane]);
-                kept += 1;
-            }
+            kept = keep_lanes(&mut self.parts, first, any & asked, kept);
         }
         self.count = kept;
         self.parts.iter_mut().for_each(|part| part.truncate(kept));

@@ -10,6 +10,18 @@ use crate::beam::Beam;
 /// Lanes of a vector.
 pub(crate) const LANES: usize = 16;
 
+/// Moves the lanes that `bits` name, of the vector at `first`, down to where `kept` are already, and says how many are kept then.
+#[inline(always)]
+pub(crate) fn keep_lanes(parts: &mut [Vec<f32>], first: usize, mut bits: u64, mut kept: usize) -> usize {
+    while bits != 0 {
+        let lane = first + bits.trailing_zeros() as usize;
+        bits &= bits - 1;
+        parts.iter_mut().for_each(|part| part[kept] = part[lane]);
+        kept += 1;
+    }
+    kept
+}
+
 /// Things of N/3 corners each.
 #[derive(Debug)]
 pub(crate) struct Chosen<const N: usize> {

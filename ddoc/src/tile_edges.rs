@@ -4,7 +4,7 @@ use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
 use glam::Vec3;
 use gnomon_shadow_map::light_maps::Receiver;
 
-use crate::chosen::LANES;
+use crate::chosen::{LANES, keep_lanes};
 use crate::silhouettes::Edge;
 
 /// Numbers an edge: a, b, the two planes, the two signs; the point seen past the edge.
@@ -85,13 +85,7 @@ impl TileEdges {
                     break;
                 }
             }
-            let mut bits = counts & valid;
-            while bits != 0 {
-                let lane = first + bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                self.parts.iter_mut().for_each(|part| part[kept] = part[lane]);
-                kept += 1;
-            }
+            kept = keep_lanes(&mut self.parts, first, counts & valid, kept);
         }
         self.count = kept;
         self.parts.iter_mut().for_each(|part| part.truncate(kept));
