@@ -16,7 +16,7 @@ use scene_core::light::LightHull;
 
 use crate::grid::{Grid, RATIO, Range, TileLists};
 use crate::light_image::{Bounds, LightImage};
-use crate::splat::splat;
+use crate::splat::{Splat, splat};
 
 /// How often a splat is cut to the receivers within its reach.
 const CUTS: usize = 3;
@@ -165,7 +165,7 @@ fn splat_edge(
 ) {
     let grid = &farthest.grid;
     let (Ok(mut reach) | Err(mut reach)) = far;
-    let Some(bounds) = splat(image, ends, hull, reach) else { return };
+    let Some(Splat { bounds, beyond }) = splat(image, ends, hull, reach) else { return };
     let mut range = grid.range(bounds);
     if skip && far.is_err() {
         for _ in 0..CUTS {
@@ -174,16 +174,15 @@ fn splat_edge(
                 break;
             }
             reach = within;
-            let Some(bounds) = splat(image, ends, hull, reach) else { return };
+            let Some(Splat { bounds, .. }) = splat(image, ends, hull, reach) else { return };
             range = grid.range(bounds);
         }
     }
-    let nearest = image.along(ends[0]).min(image.along(ends[1]));
     let (first, side) = (grid.first_of(range.level), grid.tiles_at(range.level));
     for row in range.first[1]..=range.last[1] {
         for column in range.first[0]..=range.last[0] {
             let tile = first + (row * side + column) as usize;
-            if !skip || farthest.of(tile) > nearest {
+            if !skip || farthest.of(tile) > beyond {
                 entry(tile as u32);
             }
         }

@@ -122,16 +122,28 @@ impl LightImage {
         }))
     }
 
+    /// How fast the distance grows on the way that the shadow of `point` takes from the light's point `from`: the cosine
+    /// between the two. `None` where the two points are one.
+    pub fn rate(&self, point: Vec3, from: LightPoint) -> Option<f64> {
+        let axis = self.along.truncate().as_dvec3();
+        Some(axis.try_normalize()?.dot(way_of_shadow(point, from).try_normalize()?))
+    }
+
     /// Where the shadow of an edge's point ends: what the light's point `from` throws from `point` to the distance `far`.
     /// `None` if it never gets there.
     pub fn thrown(&self, point: Vec3, from: LightPoint, far: f32) -> Option<Vec3> {
-        let direction = match from {
-            LightPoint::At(place) => point.as_dvec3() - place.as_dvec3(),
-            LightPoint::Towards(direction) => -direction.as_dvec3(),
-        };
+        let direction = way_of_shadow(point, from);
         let rate = self.along.truncate().as_dvec3().dot(direction);
         let way = f64::from(far) - f64::from(self.along(point));
         let thrown: DVec3 = point.as_dvec3() + direction * (way.max(0.0) / rate);
         (rate > 0.0 && thrown.is_finite()).then(|| thrown.as_vec3())
+    }
+}
+
+/// The way that the shadow of `point` takes from a point of the light.
+fn way_of_shadow(point: Vec3, from: LightPoint) -> DVec3 {
+    match from {
+        LightPoint::At(place) => point.as_dvec3() - place.as_dvec3(),
+        LightPoint::Towards(direction) => -direction.as_dvec3(),
     }
 }

@@ -107,7 +107,7 @@ pub fn visible<'e>(
         }
         // The receiver moved along its line to the light's centre, down to the far z.
         let far = image.along(edge.far + origin);
-        if !splat(image, ends, hull, far).is_some_and(|bounds| bounds.holds(place)) {
+        if !splat(image, ends, hull, far).is_some_and(|splat| splat.bounds.holds(place)) {
             continue;
         }
         let far_point = image.thrown(point, light.center(), far);

@@ -6,6 +6,10 @@
 //! each, so that the image of all such p lies in the convex hull of the images of the edge's ends and of what the corners
 //! of the light's hull throw from them as far as the farthest receiver: the light's true size and the two depths, nothing
 //! else.
+//!
+//! All this is so where all of the light lies nearer than the edge, by the distance along the image's axis. An edge beside a
+//! large light throws shadows back past itself, too, on receivers that are nearer than it is: its splat is taken to be
+//! everywhere.
 
 use glam::Vec3;
 use scene_core::light::LightHull;
@@ -16,26 +20,116 @@ use crate::light_image::{Bounds, LightImage};
 /// image's own coordinates is below a thousandth.
 const SLACK: f32 = 0.25;
 
-/// The bounds of a splat in the image for receivers up to the distance `far`; `None` if all of them lie before the edge.
-/// Everything where the shadow reaches behind the light's plane.
-pub fn splat(image: &LightImage, ends: [Vec3; 2], hull: Option<&LightHull>, far: f32) -> Option<Bounds> {
+/// A cosine between a shadow's way and the image's axis below which the shadow may come back: the axis is good to 2⁻²⁴.
+const LEAST_RATE: f64 = 1.0 / 262_144.0;
+
+/// Where receivers may lie that an edge half hides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Splat {
+    /// In the image.
+    pub bounds: Bounds,
+    /// Receivers no farther along the axis than this are not reached: the edge's own distance, −∞ where shadows come back.
+    pub beyond: f32,
+}
+
+/// The splat of an edge for receivers up to the distance `far`; `None` if all of them lie before it. Everything where the
+/// shadow comes back or reaches behind the light's plane.
+pub fn splat(image: &LightImage, ends: [Vec3; 2], hull: Option<&LightHull>, far: f32) -> Option<Splat> {
+    let back_too = Splat { bounds: Bounds::ALL, beyond: f32::NEG_INFINITY };
+    let Some(hull) = hull else { return Some(back_too) };
+    let rates =
+        ends.into_iter().flat_map(|end| hull.corners().iter().map(move |&corner| image.rate(end, corner)));
+    if rates.into_iter().any(|rate| rate.is_none_or(|rate| rate <= LEAST_RATE)) {
+        return Some(back_too);
+    }
     let distances = ends.map(|end| image.along(end));
-    if distances[0].min(distances[1]) >= far {
+    let beyond = distances[0].min(distances[1]);
+    if beyond >= far {
         return None;
     }
-    let Some(hull) = hull else { return Some(Bounds::ALL) };
+    let everywhere = Splat { bounds: Bounds::ALL, beyond };
     let mut bounds = Bounds::NONE;
     for end in ends {
         match image.place(end) {
             Some(place) => bounds = bounds.with(place),
-            None => return Some(Bounds::ALL),
+            None => return Some(everywhere),
         }
         for &corner in hull.corners() {
             match image.thrown(end, corner, far).and_then(|thrown| image.place(thrown)) {
                 Some(place) => bounds = bounds.with(place),
-                None => return Some(Bounds::ALL),
+                None => return Some(everywhere),
             }
         }
     }
-    Some(bounds.grown(SLACK))
+    Some(Splat { bounds: bounds.grown(SLACK), beyond })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gnomon_shadow_map::light_views::light_views;
+    use scene_core::light::LightPoint;
+    use scene_core::{Light, scenes};
+
+    /// Every receiver that an edge lies before, as some point of the light sees it, is in the edge's splat: under lights as large as
+    /// the scene, too, whose shadows come back past edges beside them.
+    #[test]
+    fn whatever_an_edge_hides_is_in_its_splat() {
+        let setup = scenes::build("edges", 0.0).expect("built in");
+        let casters: Vec<_> = setup.scene.objects().iter().collect();
+        let bounds = setup.scene.bounds();
+        let (center, size) = (bounds.center(), bounds.size().length());
+        let mut numbers = 0x2545_f491_u32;
+        let mut number = move || {
+            numbers = numbers.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (numbers >> 8) as f32 / 8_388_608.0 - 1.0
+        };
+        let mut came_back = 0;
+        for share in [0.02, 0.2, 0.5] {
+            let radius = share * size;
+            let lights = [
+                Light::Sphere { center, radius },
+                Light::Rect { center, half_u: Vec3::X * radius, half_v: Vec3::new(0.0, 0.3, 0.9) * radius },
+                Light::Disk { center, normal: Vec3::NEG_Y, radius },
+                Light::Directional { direction: Vec3::new(0.4, -1.0, 0.3), angular_radius: share },
+            ];
+            for light in lights {
+                let hull = LightHull::of(&light).expect("not that wide");
+                let views = light_views(&setup.scene, &light, &casters, false).views;
+                let images: Vec<_> = views.into_iter().map(|view| LightImage::new(view, 256)).collect();
+                for _ in 0..4_000 {
+                    let mut point = || center + Vec3::new(number(), number(), number()) * (0.5 * size);
+                    let ends = [point(), point()];
+                    let on_edge = ends[0].lerp(ends[1], 0.5 * number() + 0.5);
+                    // A point between the hull's corners.
+                    let weights: Vec<f32> = hull.corners().iter().map(|_| number() + 1.0).collect();
+                    let sum: f32 = weights.iter().sum();
+                    let of_light =
+                        hull.corners().iter().zip(&weights).fold(Vec3::ZERO, |all, (corner, weight)| {
+                            let (LightPoint::At(at) | LightPoint::Towards(at)) = *corner;
+                            all + at * (weight / sum)
+                        });
+                    let way = match hull.corners()[0] {
+                        LightPoint::At(_) => on_edge - of_light,
+                        LightPoint::Towards(_) => -of_light * size,
+                    };
+                    let receiver = on_edge + way * (number() + 1.0);
+                    for image in &images {
+                        let (Some(place), along) = (image.place(receiver), image.along(receiver)) else {
+                            continue;
+                        };
+                        let far = along + along.abs() * 1e-5;
+                        let found = splat(image, ends, Some(&hull), far);
+                        assert!(
+                            found.is_some_and(|splat| splat.bounds.holds(place) && splat.beyond < far),
+                            "{light:?}: {ends:?} before {receiver}: {found:?}"
+                        );
+                        let nearest = image.along(ends[0]).min(image.along(ends[1]));
+                        came_back += u32::from(far < nearest);
+                    }
+                }
+            }
+        }
+        assert!(came_back > 100, "{came_back}");
+    }
 }

@@ -1,7 +1,22 @@
-//! Skipping changes nothing, whatever the variant, and leaves something out.
+//! Skipping changes nothing, whatever the variant, the scene and the light, and leaves something out.
 
+use glam::Vec3;
 use gnomon_ddoc::{Ddoc, DdocParams, Variant};
-use scene_core::{VisibilityImage, raster, scenes};
+use scene_core::{GBuffer, Light, Scene, VisibilityImage, raster, scenes};
+
+/// How many pixels differ, and what was left out with `skip` and without.
+fn differences(scene: &Scene, light: &Light, gbuffer: &GBuffer, params: DdocParams) -> (usize, [u64; 2]) {
+    let image = |skip: bool| {
+        let params = DdocParams { skip, ..params };
+        let (prepared, _) = Ddoc::new(params).prepare(scene, light).expect("few triangles");
+        let mut image = VisibilityImage::new(gbuffer.width, gbuffer.height);
+        let report = prepared.shade(gbuffer, &mut image);
+        let bits: Vec<u32> = image.values.iter().map(|v| v.to_bits()).collect();
+        (bits, report.skipped.values().sum::<u64>())
+    };
+    let ((with, left_out), (without, none)) = (image(true), image(false));
+    (with.iter().zip(&without).filter(|(a, b)| a != b).count(), [left_out, none])
+}
 
 #[test]
 fn skipping_never_changes_the_image() {
@@ -10,20 +25,40 @@ fn skipping_never_changes_the_image() {
         (setup.camera.width, setup.camera.height) = (131, 97);
         let gbuffer = raster::render_gbuffer(&setup.scene, &setup.camera);
         for variant in Variant::ALL {
-            let image = |skip: bool| {
-                let params = DdocParams { variant, map_size: 256, taps: 16, skip, ..Default::default() };
-                let (prepared, _) =
-                    Ddoc::new(params).prepare(&setup.scene, &setup.lights[0]).expect("few triangles");
-                let mut image = VisibilityImage::new(gbuffer.width, gbuffer.height);
-                let report = prepared.shade(&gbuffer, &mut image);
-                let bits: Vec<u32> = image.values.iter().map(|v| v.to_bits()).collect();
-                (bits, report.skipped.values().sum::<u64>())
-            };
-            let ((with, left_out), (without, none)) = (image(true), image(false));
-            let differ = with.iter().zip(&without).filter(|(a, b)| a != b).count();
+            let params = DdocParams { variant, map_size: 256, taps: 16, ..Default::default() };
+            let (differ, [left_out, none]) = differences(&setup.scene, &setup.lights[0], &gbuffer, params);
             assert_eq!(differ, 0, "{scene} {variant:?}");
             assert_eq!(none, 0);
             assert!(left_out > 0, "{scene} {variant:?} skips nothing");
         }
     }
+}
+
+/// Every built-in scene under its own lights, and under every kind of light, from inside the scene, too.
+#[test]
+fn whatever_the_scene_and_the_light() {
+    let mut found = Vec::new();
+    for scene in scenes::all() {
+        let mut setup = scenes::build(scene.name, 0.0).expect("built in");
+        (setup.camera.width, setup.camera.height) = if scene.name == "park" { (24, 18) } else { (96, 72) };
+        let gbuffer = raster::render_gbuffer(&setup.scene, &setup.camera);
+        let bounds = setup.scene.bounds();
+        let (center, size) = (bounds.center() + 0.1 * bounds.size(), 0.05 * bounds.size().length());
+        let others = [
+            Light::Sphere { center, radius: size },
+            Light::Disk { center: center + Vec3::Y * bounds.size().y, normal: Vec3::NEG_Y, radius: size },
+            Light::Rect { center, half_u: Vec3::X * size, half_v: Vec3::new(0.0, 0.3, 0.9) * size },
+            Light::Directional { direction: Vec3::new(0.4, -1.0, 0.3), angular_radius: 0.05 },
+            Light::Spot { position: center, direction: Vec3::NEG_Y, outer: 0.9, inner: 0.3 },
+        ];
+        let is_small = setup.scene.triangles().len() < 20_000;
+        let params = DdocParams { map_size: 256, taps: 32, ..Default::default() };
+        for light in setup.lights.iter().chain(others.iter().filter(|_| is_small)) {
+            let (differ, _) = differences(&setup.scene, light, &gbuffer, params);
+            if differ > 0 {
+                found.push(format!("{}: {differ} pixels under {light:?}", scene.name));
+            }
+        }
+    }
+    assert!(found.is_empty(), "{found:#?}");
 }
