@@ -12,14 +12,16 @@
 //! sees it.
 //!
 //! # Rounding
-//! λ is lowered by 2⁻¹⁶ and planes are moved outwards by 2⁻¹⁷ of the largest coordinate: products of two f32 and their
-//! sums are good to 2⁻²² of their terms, here and where a receiver asks.
+//! λ is lowered by 2⁻¹⁶·(1 + λ²) and planes are moved outwards by 2⁻¹⁷ of the largest coordinate: products of two f32 and
+//! their sums are good to 2⁻²² of their terms, here and where a receiver asks. Both terms of λ are a sum each, of terms as
+//! long as the way, which is √(1 + λ²) times as long as it goes forwards, or more: their quotient is good to
+//! 2⁻²²·(1 + |λ|)·√(1 + λ²), below 2⁻²¹·(1 + λ²).
 
 use glam::{Vec3, Vec4};
 use scene_core::geometry::Aabb;
 use scene_core::light::{LightHull, LightPoint};
 
-/// λ is lowered by this, as a share of the axis' length.
+/// λ is lowered by this times 1 + λ².
 const TILT: f32 = 1.0 / 65_536.0;
 
 /// Planes are moved outwards by this share of the largest coordinate.
@@ -76,7 +78,8 @@ impl Beam {
         };
         let mut planes = [plane(-axis); 5];
         for i in 0..4 {
-            planes[i] = plane(directions[i] - axis * (steepest[i] + TILT));
+            planes[i] =
+                plane(directions[i] - axis * (steepest[i] + TILT * (1.0 + steepest[i] * steepest[i])));
         }
         planes.iter().all(|plane| plane.is_finite()).then_some(Self { planes })
     }
