@@ -11,8 +11,11 @@
 use serde::{Deserialize, Serialize};
 
 use crate::events::Event;
-use crate::greedy::Greedy;
+use crate::greedy::{Greedy, Levels};
+use crate::greedy_lanes::LaneGreedy;
 use crate::nodes::Node;
+use crate::sorting::SortedStrip;
+use crate::surfaces::Surface;
 use crate::tunnel::{Gate, Tunnel};
 
 /// How far a compressed function may be from the true one.
@@ -78,6 +81,9 @@ impl From<f32> for Compression {
 #[derive(Clone, Debug, Default)]
 pub struct Compressor {
     tunnel: Tunnel,
+    lanes: LaneGreedy,
+    /// Of one pixel.
+    events: Vec<Event>,
     is_started: bool,
     /// By maps in shadow: V, and the bound there.
     levels: Vec<(f64, f64)>,
@@ -87,6 +93,55 @@ pub struct Compressor {
 }
 
 impl Compressor {
+    /// [`compress`](Self::compress) of all pixels of a strip, whose numbers of nodes are appended to `counts`.
+    pub(crate) fn compress_strip(
+        &mut self,
+        strip: &SortedStrip,
+        views: u32,
+        compression: Compression,
+        counts: &mut Vec<u32>,
+        nodes: &mut Vec<Node>,
+    ) {
+        if compression.segments == Segments::Greedy && !compression.bound.of_display {
+            self.begin(compression.bound, views);
+            let levels = self.greedy_levels();
+            return self.lanes.compress(strip, &levels, counts, nodes);
+        }
+        let mut events = std::mem::take(&mut self.events);
+        for pixel in 0..strip.counts().len() {
+            let start = nodes.len();
+            events.clear();
+            events.extend(strip.pixel(pixel));
+            self.compress(&events, views, compression, nodes);
+            counts.push((nodes.len() - start) as u32);
+        }
+        self.events = events;
+    }
+
+    /// [`compress_at`](Self::compress_at) of all pixels of a strip at those of its surfaces, likewise.
+    pub(crate) fn compress_strip_at(
+        &mut self,
+        strip: &SortedStrip,
+        mut asked: &[Surface],
+        views: u32,
+        bound: ErrorBound,
+        counts: &mut Vec<u32>,
+        nodes: &mut Vec<Node>,
+    ) {
+        let mut events = std::mem::take(&mut self.events);
+        for pixel in 0..strip.counts().len() {
+            let end = asked.partition_point(|surface| surface.pixel as usize <= pixel);
+            let (own, rest) = asked.split_at(end);
+            let start = nodes.len();
+            events.clear();
+            events.extend(strip.pixel(pixel));
+            self.compress_at(&events, own.iter().map(|surface| surface.range), views, bound, nodes);
+            counts.push((nodes.len() - start) as u32);
+            asked = rest;
+        }
+        self.events = events;
+    }
+
     /// Appends to `nodes` the function that `events`, ascending, of `views` maps make: V is 1 before the first node,
     /// within `bound` of the true step function everywhere, and stays what it is after the last. A
     /// function that is nowhere farther from 1 leaves no node.
@@ -148,23 +203,34 @@ impl Compressor {
 
     fn greedy(&mut self, mut steps: Steps<'_>, start: usize, nodes: &mut Vec<Node>) {
         let Some(first) = steps.events.first() else { return };
+        let levels = self.greedy_levels();
         let mut line = Greedy::new(Node { t: first.t(), visibility: 1.0 }, nodes);
         let mut before = 0;
         while let Some((t, after)) = steps.next() {
             if after == before {
                 continue;
             }
-            let sides = [before, after].map(|shadowed| {
-                let (visibility, bound) = self.levels[shadowed as usize];
-                self.is_needed |= 1.0 - visibility > bound;
-                [visibility as f32, bound as f32]
-            });
+            self.is_needed |= after >= levels.needed;
+            let sides = [before, after]
+                .map(|shadowed| [levels.at(shadowed), self.levels[shadowed as usize].1 as f32]);
             line.visit_step(t as f32, sides);
             before = after;
         }
         line.end();
         if !self.is_needed {
             nodes.truncate(start);
+        }
+    }
+
+    /// What greedy lines need to know of the levels. Both V and the bound fall with maps in shadow, V faster: from some number on
+    /// V is farther from 1 than the bound allows.
+    fn greedy_levels(&self) -> Levels {
+        let needed = self.levels.partition_point(|&(visibility, bound)| 1.0 - visibility <= bound);
+        Levels {
+            views: self.levels.len() as u32 - 1,
+            share: (self.levels.len() as f32 - 1.0).max(1.0).recip(),
+            bound: self.levels[0].1 as f32,
+            needed: needed as u32,
         }
     }
 

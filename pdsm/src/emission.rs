@@ -235,7 +235,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::events::SortedStrip;
+    use crate::sorting::SortedStrip;
     use crate::walk::walk_events;
 
     fn sorted(events: &EventStrips) -> Vec<Vec<Event>> {
@@ -243,8 +243,8 @@ mod tests {
         let mut pixels = Vec::new();
         for index in 0..events.strip_count() {
             let count = (events.size() * events.strip_rows(index)) as usize;
-            strip.sort(count, &[events.strip(index)]);
-            pixels.extend((0..count).map(|pixel| strip.pixel(pixel).to_vec()));
+            strip.sort(count, &events.strip(index).collect::<Vec<_>>());
+            pixels.extend((0..count).map(|pixel| strip.pixel(pixel).collect::<Vec<_>>()));
         }
         pixels
     }

@@ -29,6 +29,18 @@ impl Event {
     pub fn is_exit(self) -> bool {
         self.0 & 1 == 1
     }
+
+    /// The number that it sorts by.
+    #[inline]
+    pub(crate) fn ordered(self) -> u32 {
+        self.0
+    }
+
+    /// The event with this number.
+    #[inline]
+    pub(crate) fn from_ordered(ordered: u32) -> Self {
+        Self(ordered)
+    }
 }
 
 /// An event and where in its strip of rows the pixel is.
@@ -46,7 +58,27 @@ pub struct EventStrips {
     size: u32,
     /// Rows of a strip are 2 to this power.
     row_bits: u32,
-    strips: Vec<Vec<PlacedEvent>>,
+    strips: Vec<Strip>,
+}
+
+/// Events that are kept in one piece: 32 KiB, so that none is moved as more come.
+const PIECE: usize = 4096;
+
+#[derive(Clone, Debug, Default)]
+struct Strip {
+    full: Vec<Vec<PlacedEvent>>,
+    last: Vec<PlacedEvent>,
+}
+
+impl Strip {
+    #[cold]
+    fn begin_piece(&mut self) {
+        self.full.push(std::mem::replace(&mut self.last, Vec::with_capacity(PIECE)));
+    }
+
+    fn len(&self) -> usize {
+        self.full.len() * PIECE + self.last.len()
+    }
 }
 
 /// Rows of a strip are 2 to this power. Some 32 strips: enough to share among threads, few enough to be written to side by
@@ -59,7 +91,7 @@ impl EventStrips {
     /// Strips of a PDSM of `size` × `size` pixels.
     pub fn new(size: u32) -> Self {
         let row_bits = row_bits(size);
-        Self { size, row_bits, strips: vec![Vec::new(); size.div_ceil(1 << row_bits) as usize] }
+        Self { size, row_bits, strips: vec![Strip::default(); size.div_ceil(1 << row_bits) as usize] }
     }
 
     /// Pixels a side of the PDSM.
@@ -72,7 +104,11 @@ impl EventStrips {
     pub fn push(&mut self, x: u32, y: u32, event: Event) {
         let strip = y >> self.row_bits;
         let pixel = (y - (strip << self.row_bits)) * self.size + x;
-        self.strips[strip as usize].push(PlacedEvent { pixel, event });
+        let strip = &mut self.strips[strip as usize];
+        if strip.last.len() == PIECE {
+            strip.begin_piece();
+        }
+        strip.last.push(PlacedEvent { pixel, event });
     }
 
     /// Strip and pixel in it of column `x`, row `y` of a PDSM of `size` × `size` pixels.
@@ -85,7 +121,7 @@ impl EventStrips {
 
     /// Events in all.
     pub fn len(&self) -> usize {
-        self.strips.iter().map(Vec::len).sum()
+        self.strips.iter().map(Strip::len).sum()
     }
 
     /// Whether there are none.
@@ -103,58 +139,17 @@ impl EventStrips {
         (self.size - ((index as u32) << self.row_bits)).min(1 << self.row_bits)
     }
 
-    /// Events of strip `index`, in the order they came.
-    pub fn strip(&self, index: usize) -> &[PlacedEvent] {
-        &self.strips[index]
-    }
-}
-
-/// Events of a strip by pixel, each pixel's in ascending order.
-#[derive(Clone, Debug, Default)]
-pub struct SortedStrip {
-    /// Where each pixel's events start, and their end.
-    starts: Vec<u32>,
-    events: Vec<Event>,
-}
-
-impl SortedStrip {
-    /// Sorts the events that several collections hold for one strip of `pixels` pixels: a counting sort by pixel, then
-    /// each pixel's few by depth. The order in which they came leaves no trace.
-    pub fn sort(&mut self, pixels: usize, parts: &[&[PlacedEvent]]) {
-        self.starts.clear();
-        self.starts.resize(pixels + 1, 0);
-        for placed in parts.iter().copied().flatten() {
-            self.starts[placed.pixel as usize + 1] += 1;
-        }
-        for pixel in 0..pixels {
-            self.starts[pixel + 1] += self.starts[pixel];
-        }
-        let total = self.starts[pixels] as usize;
-        self.events.clear();
-        self.events.resize(total, Event(0));
-        // Each start is moved to its end while placing, and stands for the next one's start thereafter.
-        for placed in parts.iter().copied().flatten() {
-            let slot = &mut self.starts[placed.pixel as usize];
-            self.events[*slot as usize] = placed.event;
-            *slot += 1;
-        }
-        self.starts.rotate_right(1);
-        self.starts[0] = 0;
-        for pixel in 0..pixels {
-            let range = self.starts[pixel] as usize..self.starts[pixel + 1] as usize;
-            self.events[range].sort_unstable();
-        }
-    }
-
-    /// Events of a pixel, ascending.
-    pub fn pixel(&self, pixel: usize) -> &[Event] {
-        &self.events[self.starts[pixel] as usize..self.starts[pixel + 1] as usize]
+    /// Events of strip `index`, in the order they came, in pieces.
+    pub fn strip(&self, index: usize) -> impl Iterator<Item = &[PlacedEvent]> {
+        let Strip { full, last } = &self.strips[index];
+        full.iter().chain(std::iter::once(last)).map(Vec::as_slice)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sorting::SortedStrip;
 
     #[test]
     fn events_sort_by_depth_and_entries_come_first() {
@@ -172,29 +167,27 @@ mod tests {
     #[test]
     fn a_strip_keeps_every_event_at_its_pixel() {
         let mut strips = EventStrips::new(100);
-        for i in 0..1000u32 {
+        // More than a piece in some strips.
+        for i in 0..120_000u32 {
             strips.push(i * 7 % 100, i * 13 % 100, Event::new((i % 17) as f32, i % 2 == 1));
         }
         let mut sorted = SortedStrip::default();
         let mut count = 0;
         for index in 0..strips.strip_count() {
             let pixels = 100 * strips.strip_rows(index) as usize;
-            let (front, back) = strips.strip(index).split_at(strips.strip(index).len() / 2);
-            sorted.sort(pixels, &[back, front]);
+            let pieces: Vec<_> = strips.strip(index).collect();
+            let all: Vec<_> = pieces.iter().copied().flatten().collect();
+            sorted.sort(pixels, &pieces);
             for pixel in 0..pixels {
-                let events = sorted.pixel(pixel);
+                let events: Vec<_> = sorted.pixel(pixel).collect();
                 assert!(events.is_sorted());
-                let mut expected: Vec<_> = strips
-                    .strip(index)
-                    .iter()
-                    .filter(|e| e.pixel as usize == pixel)
-                    .map(|e| e.event)
-                    .collect();
+                let mut expected: Vec<_> =
+                    all.iter().filter(|e| e.pixel as usize == pixel).map(|e| e.event).collect();
                 expected.sort();
                 assert_eq!(events, expected);
                 count += events.len();
             }
         }
-        assert_eq!(count, 1000);
+        assert_eq!((count, strips.len()), (120_000, 120_000));
     }
 }

@@ -5,9 +5,10 @@ use bytemuck::Zeroable;
 use rayon::prelude::*;
 
 use crate::compression::{Compression, Compressor};
-use crate::events::{EventStrips, SortedStrip};
+use crate::events::EventStrips;
 use crate::nodes::{Node, Nodes};
-use crate::surfaces::{Surface, Surfaces};
+use crate::sorting::SortedStrip;
+use crate::surfaces::Surfaces;
 
 /// The functions of a PDSM of n × n pixels.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -53,34 +54,29 @@ impl Functions {
         let strips: Vec<Strip> = (0..layout.strip_count())
             .into_par_iter()
             .map_init(<(SortedStrip, Compressor)>::default, |(sorted, compressor), index| {
-                let events: Vec<_> = parts.iter().map(|part| part.strip(index)).collect();
+                let events: Vec<_> = parts.iter().flat_map(|part| part.strip(index)).collect();
                 let pixels = (size * layout.strip_rows(index)) as usize;
                 sorted.sort(pixels, &events);
-                let mut strip = Strip {
-                    counts: Vec::with_capacity(pixels),
-                    nodes: Vec::new(),
-                    statistics: Statistics::default(),
-                };
-                let mut asked = surfaces.map_or(&[] as &[Surface], |surfaces| surfaces.strip(index));
-                for pixel in 0..pixels {
-                    let (events, start) = (sorted.pixel(pixel), strip.nodes.len());
-                    if surfaces.is_some() {
-                        let end = asked.partition_point(|surface| surface.pixel as usize <= pixel);
-                        let (own, rest) = asked.split_at(end);
-                        let own = own.iter().map(|surface| surface.range);
-                        compressor.compress_at(events, own, views, compression.bound, &mut strip.nodes);
-                        asked = rest;
-                    } else {
-                        compressor.compress(events, views, compression, &mut strip.nodes);
-                    }
-                    let count = (strip.nodes.len() - start) as u32;
-                    strip.counts.push(count);
-                    let statistics = &mut strip.statistics;
-                    statistics.events += events.len() as u64;
-                    statistics.most_events = statistics.most_events.max(events.len() as u32);
-                    statistics.most_nodes = statistics.most_nodes.max(count);
+                let (mut counts, mut nodes) = (Vec::with_capacity(pixels), Vec::new());
+                if let Some(surfaces) = surfaces {
+                    let asked = surfaces.strip(index);
+                    compressor.compress_strip_at(
+                        sorted,
+                        asked,
+                        views,
+                        compression.bound,
+                        &mut counts,
+                        &mut nodes,
+                    );
+                } else {
+                    compressor.compress_strip(sorted, views, compression, &mut counts, &mut nodes);
                 }
-                strip
+                let statistics = Statistics {
+                    events: sorted.counts().iter().map(|&count| u64::from(count)).sum(),
+                    most_events: sorted.counts().iter().max().copied().unwrap_or(0),
+                    most_nodes: counts.iter().max().copied().unwrap_or(0),
+                };
+                Strip { counts, nodes, statistics }
             })
             .collect();
         let mut functions = Self { size, ..Self::default() };

@@ -3,6 +3,27 @@
 
 use crate::nodes::Node;
 
+/// V by maps in shadow, as greedy lines take it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Levels {
+    /// Maps in all.
+    pub(crate) views: u32,
+    /// What each of them hides.
+    pub(crate) share: f32,
+    /// How far lines may be off, where that is the same everywhere.
+    pub(crate) bound: f32,
+    /// Maps in shadow from which on V is farther from 1 than that.
+    pub(crate) needed: u32,
+}
+
+impl Levels {
+    /// V with so many maps in shadow, to an ulp of 1.
+    #[inline]
+    pub(crate) fn at(&self, shadowed: u32) -> f32 {
+        1.0 - shadowed as f32 * self.share
+    }
+}
+
 /// The segment being drawn: from `origin`, with any slope in a window.
 #[derive(Debug)]
 pub(crate) struct Greedy<'a> {

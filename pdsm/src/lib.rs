@@ -10,12 +10,14 @@ pub mod functions;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod greedy;
+mod greedy_lanes;
 pub mod grid;
 pub mod layout;
 mod lookup;
 pub mod maps;
 pub mod nodes;
 mod params;
+pub mod sorting;
 pub mod surfaces;
 mod technique;
 mod tunnel;
