@@ -45,8 +45,9 @@ pub struct HeadlessFrame {
 pub struct HeadlessRun {
     /// V of every pixel that sees a surface; NaN elsewhere.
     pub visibility: VisibilityImage,
-    /// Bytes and skips of both steps, milliseconds per stage, `prepare.…` and `shade.…`, and the adapter. Without
-    /// timestamps the steps are timed by the clock on the wall, as `prepare.wall` and `shade.wall`.
+    /// Bytes and skips of both steps, milliseconds per stage, `prepare.…` and `shade.…`, and the adapter. On a GPU in software
+    /// stages run one after the other, timed [on the wall](StageTimer::on_the_wall); on others without timestamps the steps are timed as a whole,
+    /// as `prepare.wall` and `shade.wall`.
     pub report: Report,
     /// Wall time of preparation, from recording to the end of the GPU's work.
     pub prepare_ms: f64,
@@ -97,7 +98,10 @@ impl Gpu {
         let targets =
             self.scoped("the G-buffer", || GBufferTargets::new(&self.device, camera.width, camera.height))?;
         let visibility = self.scoped("the visibility texture", || self.visibility_texture(&targets))?;
-        let timer = StageTimer::new(&self.device, &self.queue, TIMED_PASSES);
+        let timer = match self.is_software() {
+            true => Some(StageTimer::on_the_wall()),
+            false => StageTimer::new(&self.device, &self.queue, TIMED_PASSES),
+        };
         Ok(HeadlessView { gpu: self, scene, camera, buffers, pass: None, targets, visibility, timer })
     }
 

@@ -122,8 +122,8 @@ impl Gpu {
     /// # Errors
     /// What went wrong on the device.
     pub fn read_times(&self, timer: &mut StageTimer) -> Result<Report, GpuError> {
-        let ticks = self.read_buffer(timer.buffer())?;
-        Ok(timer.take(&ticks))
+        let ticks = timer.buffer().map(|buffer| self.read_buffer(buffer)).transpose()?;
+        Ok(timer.take(&ticks.unwrap_or_default()))
     }
 
     fn staging(&self, size: u64) -> Result<wgpu::Buffer, GpuError> {

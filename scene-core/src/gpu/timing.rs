@@ -1,17 +1,35 @@
-//! Time per stage on the GPU's own clock, where the device offers timestamps.
+//! Time per stage: on the GPU's own clock, where the device offers timestamps, or on that on the wall.
 
-use std::fmt;
+use std::time::Instant;
+use std::{fmt, mem};
 
 use crate::Report;
 
-/// Stages of one frame and the queries that time them. A stage is a pass; passes of the same name add up.
-pub struct StageTimer {
+/// Times the stages of one frame. A stage is a pass; passes of the same name add up.
+#[derive(Debug)]
+pub struct StageTimer(Clock);
+
+#[derive(Debug)]
+enum Clock {
+    Device(DeviceClock),
+    Wall(WallClock),
+}
+
+/// Stages and the queries that time them.
+struct DeviceClock {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
     /// Nanoseconds a tick.
     period: f32,
     stages: Vec<String>,
     capacity: u32,
+}
+
+/// The stage that is being recorded, and the times of those before it.
+#[derive(Debug, Default)]
+struct WallClock {
+    current: Option<(String, Instant)>,
+    report: Report,
 }
 
 impl StageTimer {
@@ -33,9 +51,49 @@ impl StageTimer {
             usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
-        Some(Self { queries, resolved, period: queue.get_timestamp_period(), stages: Vec::new(), capacity })
+        let period = queue.get_timestamp_period();
+        Some(Self(Clock::Device(DeviceClock { queries, resolved, period, stages: Vec::new(), capacity })))
     }
 
+    /// A timer that submits what a stage recorded and waits for it before the next one begins.
+    ///
+    /// For GPUs in software: Mesa's takes both timestamps of a compute pass after its work, and books that work nowhere. A real GPU
+    /// would idle between the stages.
+    pub fn on_the_wall() -> Self {
+        Self(Clock::Wall(WallClock::default()))
+    }
+
+    /// Records the copy of all times to [`StageTimer::buffer`]. Once a frame, after the last pass.
+    pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
+        let Clock::Device(clock) = &self.0 else { return };
+        if !clock.stages.is_empty() {
+            encoder.resolve_query_set(&clock.queries, 0..2 * clock.stages.len() as u32, &clock.resolved, 0);
+        }
+    }
+
+    /// Start and end of every stage, as u64 ticks; usages `COPY_SRC`. `None` on the wall.
+    pub fn buffer(&self) -> Option<&wgpu::Buffer> {
+        match &self.0 {
+            Clock::Device(clock) => Some(&clock.resolved),
+            Clock::Wall(_) => None,
+        }
+    }
+
+    /// Milliseconds per stage from what [`StageTimer::buffer`] held after the frame, and makes ready for the next
+    /// frame. A stage whose end lies before its start, as some drivers report now and then, counts 0. Of a timer on the wall the
+    /// last stage ends here: call it when the frame's work is done.
+    pub fn take(&mut self, ticks: &[u64]) -> Report {
+        match &mut self.0 {
+            Clock::Device(clock) => clock.take(ticks),
+            Clock::Wall(clock) => {
+                clock.end();
+                mem::take(&mut clock.report)
+            }
+        }
+    }
+}
+
+impl DeviceClock {
     fn begin(&mut self, stage: &str) -> Option<(wgpu::QuerySet, u32)> {
         let index = self.stages.len() as u32;
         if index >= self.capacity {
@@ -45,21 +103,7 @@ impl StageTimer {
         Some((self.queries.clone(), 2 * index))
     }
 
-    /// Records the copy of all times to [`StageTimer::buffer`]. Once a frame, after the last pass.
-    pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
-        if !self.stages.is_empty() {
-            encoder.resolve_query_set(&self.queries, 0..2 * self.stages.len() as u32, &self.resolved, 0);
-        }
-    }
-
-    /// Start and end of every stage, as u64 ticks; usages `COPY_SRC`.
-    pub fn buffer(&self) -> &wgpu::Buffer {
-        &self.resolved
-    }
-
-    /// Milliseconds per stage from what [`StageTimer::buffer`] held after the frame, and makes ready for the next
-    /// frame. A stage whose end lies before its start, as some drivers report now and then, counts 0.
-    pub fn take(&mut self, ticks: &[u64]) -> Report {
+    fn take(&mut self, ticks: &[u64]) -> Report {
         let mut report = Report::default();
         for (stage, times) in self.stages.drain(..).zip(ticks.chunks_exact(2)) {
             let ms = times[1].saturating_sub(times[0]) as f64 * f64::from(self.period) * 1e-6;
@@ -69,15 +113,35 @@ impl StageTimer {
     }
 }
 
-impl fmt::Debug for StageTimer {
+impl WallClock {
+    fn is_in(&self, stage: &str) -> bool {
+        self.current.as_ref().is_some_and(|(current, _)| current == stage)
+    }
+
+    fn begin(&mut self, stage: &str) {
+        self.end();
+        self.current = Some((stage.to_owned(), Instant::now()));
+    }
+
+    fn end(&mut self) {
+        if let Some((stage, start)) = self.current.take() {
+            *self.report.stages_ms.entry(stage).or_default() += start.elapsed().as_secs_f64() * 1e3;
+        }
+    }
+}
+
+impl fmt::Debug for DeviceClock {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("StageTimer").field("stages", &self.stages).field("capacity", &self.capacity).finish()
+        f.debug_struct("DeviceClock")
+            .field("stages", &self.stages)
+            .field("capacity", &self.capacity)
+            .finish_non_exhaustive()
     }
 }
 
 /// Where a technique records: the caller's device, queue and encoder, and a timer if the caller has one.
 ///
-/// Nothing recorded here is submitted, and nothing waits. What the CPU hands over is in buffers that are not written
+/// Nothing recorded here is submitted, and nothing waits, but for a timer [on the wall](StageTimer::on_the_wall). What the CPU hands over is in buffers that are not written
 /// again ([`HeldBuffer`](super::HeldBuffer)), so that any number of calls may share one encoder.
 #[derive(Debug)]
 pub struct Recorder<'a> {
@@ -101,9 +165,21 @@ impl<'a> Recorder<'a> {
         Self { device, queue, encoder, timer: None }
     }
 
-    /// Books a pass under `stage`, named as on the CPU: `prepare.…` or `shade.…`.
+    /// Books the pass that is recorded next under `stage`, named as on the CPU: `prepare.…` or `shade.…`.
     pub fn stage(&mut self, stage: &str) -> StageSpan {
-        StageSpan(self.timer.as_mut().and_then(|timer| timer.begin(stage)))
+        let Some(StageTimer(clock)) = self.timer.as_deref_mut() else { return StageSpan(None) };
+        match clock {
+            Clock::Device(clock) => StageSpan(clock.begin(stage)),
+            Clock::Wall(clock) if clock.is_in(stage) => StageSpan(None),
+            Clock::Wall(clock) => {
+                let next = self.device.create_command_encoder(&Default::default());
+                self.queue.submit([mem::replace(self.encoder, next).finish()]);
+                // A lost device is told where the frame is submitted.
+                let _ = self.device.poll(wgpu::PollType::wait_indefinitely());
+                clock.begin(stage);
+                StageSpan(None)
+            }
+        }
     }
 }
 
