@@ -86,8 +86,17 @@ fn culling(criterion: &mut Criterion) {
     }
 }
 
+/// A scene that fits into caches, and one of two million triangles that does not.
+const STREAMED: [&str; 2] = ["chess", "knot:sides=250"];
+
 fn silhouettes(criterion: &mut Criterion) {
-    let setup = scenes::build("chess", 0.0).expect("a built-in scene");
+    for spec in STREAMED {
+        silhouettes_of(criterion, spec);
+    }
+}
+
+fn silhouettes_of(criterion: &mut Criterion, spec: &str) {
+    let setup = scenes::build(spec, 0.0).expect("a built-in scene");
     let scene = &setup.scene;
     let casters = Casters::new(scene).expect("few triangles");
     let facing = facing(scene.positions(), scene.triangles(), setup.lights[0].center());
@@ -95,7 +104,7 @@ fn silhouettes(criterion: &mut Criterion) {
     let edges = casters.topology.len();
     let incidences: usize = (0..edges).map(|e| casters.topology.faces(e).len()).sum();
     let bytes = (edges * (8 + 4) + incidences * (4 + 1)) as u64;
-    let mut group = criterion.benchmark_group("silhouette");
+    let mut group = criterion.benchmark_group(format!("silhouette/{spec}"));
     for (name, throughput) in
         [("edges", Throughput::Elements(edges as u64)), ("bytes", Throughput::Bytes(bytes))]
     {
@@ -111,9 +120,15 @@ fn silhouettes(criterion: &mut Criterion) {
 /// nothing.
 #[cfg(feature = "gpu")]
 fn silhouettes_on_gpu(criterion: &mut Criterion) {
-    use scene_core::gpu::Gpu;
-    let Ok(gpu) = Gpu::open() else { return };
-    let setup = scenes::build("chess", 0.0).expect("a built-in scene");
+    let Ok(gpu) = scene_core::gpu::Gpu::open() else { return };
+    for spec in STREAMED {
+        silhouettes_of_on_gpu(criterion, &gpu, spec);
+    }
+}
+
+#[cfg(feature = "gpu")]
+fn silhouettes_of_on_gpu(criterion: &mut Criterion, gpu: &scene_core::gpu::Gpu, spec: &str) {
+    let setup = scenes::build(spec, 0.0).expect("a built-in scene");
     let scene = &setup.scene;
     let topology = Casters::new(scene).expect("few triangles").topology;
     let incidences: usize = (0..topology.len()).map(|e| topology.faces(e).len()).sum();
@@ -123,7 +138,7 @@ fn silhouettes_on_gpu(criterion: &mut Criterion) {
     let mut view = gpu.view(scene, &camera).expect("a small scene");
     view.upload_gbuffer(&gbuffer).expect("the camera's size");
     let mut technique = view.technique(&StencilVolumes::default()).expect("a GPU path");
-    let mut group = criterion.benchmark_group("silhouette on the GPU");
+    let mut group = criterion.benchmark_group(format!("silhouette on the GPU/{spec}"));
     group.sample_size(10);
     for (name, throughput) in
         [("edges", Throughput::Elements(topology.len() as u64)), ("bytes", Throughput::Bytes(bytes))]
