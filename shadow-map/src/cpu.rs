@@ -9,9 +9,7 @@ use scene_core::{GBuffer, Scene, VisibilityImage};
 
 use crate::light_maps::{LightMaps, Receiver, ShadowMapView, Window};
 use crate::light_views::LightView;
-use crate::patches::{Outcome, Patch, PatchRow, Questions, TILE};
 use crate::receiver_plane::view_tolerance;
-use crate::texel_outcomes::{TexelOutcomes, bits};
 
 /// `prepare.maps`: draws the casters, ranges of [`Scene::triangles`], as each view sees them.
 pub fn render_maps(
@@ -81,78 +79,6 @@ fn render_map_into(
     (map.width, map.height) = (size, size);
     let options = DepthOptions { triangles: Some(casters), window, ..Default::default() };
     render_depth_and_triangles_into(scene, view.projection_from_world, &options, scratch, map, triangles);
-}
-
-/// V of every pixel that sees a surface, NaN elsewhere, with the pixels of each patch asked together. `fill` says what the
-/// texels are to a patch, `constant` the V of pixels for which all texels are alike, if that is one V, and `known` V at a point of the
-/// patch, if that takes texels alone of which it is known what they are. Others are given to `answer`, which counts what took no filter.
-/// Returns how many those are, and how many pixels were not given to it.
-#[expect(clippy::too_many_arguments, reason = "what is read, what is written, and four questions")]
-pub fn shade_patches(
-    maps: &LightMaps<'_>,
-    gbuffer: &GBuffer,
-    patches: &[PatchRow],
-    values: &mut [f32],
-    fill: impl Fn(&Patch, &mut Questions, &mut TexelOutcomes) -> bool + Sync,
-    constant: impl Fn(Outcome) -> Option<f32> + Sync,
-    known: impl Fn(&TexelOutcomes, Vec3, [u32; 2]) -> Option<f32> + Sync,
-    answer: impl Fn(Option<&TexelOutcomes>, &Receiver, &mut u64) -> f32 + Sync,
-) -> [u64; 2] {
-    let width = gbuffer.width.max(1) as usize;
-    let shade_row = |(tile_row, values): (usize, &mut [f32])| {
-        let (mut outcomes, mut counts) = (TexelOutcomes::default(), [0; 2]);
-        let rows = values.len() / width;
-        for (tile, x) in (0..width).step_by(TILE).enumerate() {
-            let columns = TILE.min(width - x);
-            let line = u64::MAX >> (64 - columns);
-            let whole = (0..rows).fold(0, |bits, row| bits | line << (row * TILE));
-            let mut rest: u64 = whole;
-            for patch in patches[tile_row].of(tile) {
-                let Some(mut questions) = Questions::new(patch, &maps.light, maps.tolerance) else {
-                    continue;
-                };
-                if !fill(patch, &mut questions, &mut outcomes) {
-                    continue;
-                }
-                rest &= !patch.mask;
-                if let Some(v) = outcomes.all().and_then(&constant) {
-                    counts[1] += u64::from(patch.mask.count_ones());
-                    if patch.mask == whole {
-                        values.chunks_mut(width).for_each(|line| line[x..x + columns].fill(v));
-                    } else {
-                        bits(patch.mask.into())
-                            .for_each(|bit| values[bit / TILE * width + x + bit % TILE] = v);
-                    }
-                    continue;
-                }
-                for bit in bits(patch.mask.into()) {
-                    let (row, column) = (bit / TILE, x + bit % TILE);
-                    let pixel = (tile_row * TILE + row) * width + column;
-                    let at = [column as u32, (tile_row * TILE + row) as u32];
-                    let v = known(&outcomes, gbuffer.position[pixel], at);
-                    counts[1] += u64::from(v.is_some());
-                    values[row * width + column] = match v {
-                        Some(v) => v,
-                        None => match receiver(maps, gbuffer, pixel) {
-                            Ok(receiver) => answer(Some(&outcomes), &receiver, &mut counts[0]),
-                            Err(known) => known,
-                        },
-                    };
-                }
-            }
-            for bit in bits(rest.into()) {
-                let (row, column) = (bit / TILE, x + bit % TILE);
-                values[row * width + column] =
-                    match receiver(maps, gbuffer, (tile_row * TILE + row) * width + column) {
-                        Ok(receiver) => answer(None, &receiver, &mut counts[0]),
-                        Err(known) => known,
-                    };
-            }
-        }
-        counts
-    };
-    let rows = values.par_chunks_mut(width * TILE).enumerate().map(shade_row);
-    rows.reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
 }
 
 /// `shade.lookup`: V of every pixel that sees a surface, NaN elsewhere. `answer` is asked where it takes a lookup:

@@ -10,9 +10,10 @@ use scene_core::{GBuffer, Report, VisibilityImage};
 use crate::PreparedVariant;
 use crate::cpu;
 use crate::light_maps::{LightMaps, Receiver, ShadowMapView};
-use crate::patches::{Form, Outcome, Patch, PatchRow, Questions, patches_of};
+use crate::patches::{Form, Outcome, PatchRow, patches_of};
 use crate::receiver_plane::{is_behind, is_near, meets, rises_above};
-use crate::texel_outcomes::{TexelOutcomes, patches_pay};
+use crate::shade_patches::{Known, PatchLookup, TilePixels, shade_patches};
+use crate::texel_outcomes::{TexelOutcomes, bits_of, patches_pay};
 
 impl LightMaps<'_> {
     /// V of one receiver, 0 or 1.
@@ -58,25 +59,45 @@ impl LightMaps<'_> {
 impl LightMaps<'_> {
     /// [`hard`](Self::hard) for every pixel, those of a patch together. Returns how many needed no lookup.
     pub fn shade_hard(&self, gbuffer: &GBuffer, patches: &[PatchRow], values: &mut [f32]) -> u64 {
-        let fill = |patch: &Patch, questions: &mut Questions, outcomes: &mut TexelOutcomes| {
-            outcomes.fill(self, patch, questions, Form::Hard, [0.0; 2], |_, _| GBuffer::NOTHING)
-        };
-        let known = |outcomes: &TexelOutcomes, point: Vec3, _| {
-            let map = &self.maps[outcomes.view];
-            let [column, row] = map.texel(map.view.project(point)?);
-            v_of(outcomes.at(column as i32, row as i32))
-        };
-        let ask = |_: Option<&TexelOutcomes>, receiver: &Receiver, _: &mut u64| self.hard(receiver);
-        let [_, known] = cpu::shade_patches(self, gbuffer, patches, values, fill, v_of, known, ask);
+        let [_, known] = shade_patches(self, gbuffer, patches, values, &HardLookup(self));
         known
     }
 }
 
-fn v_of(outcome: Outcome) -> Option<f32> {
-    match outcome {
-        Outcome::Clear => Some(1.0),
-        Outcome::Blocks => Some(0.0),
-        Outcome::Unknown => None,
+/// One comparison a pixel.
+struct HardLookup<'m>(&'m LightMaps<'m>);
+
+impl PatchLookup for HardLookup<'_> {
+    const FORM: Form = Form::Hard;
+
+    fn reach(&self) -> [f64; 2] {
+        [0.0; 2]
+    }
+
+    fn constant(&self, outcome: Outcome) -> Option<f32> {
+        match outcome {
+            Outcome::Clear => Some(1.0),
+            Outcome::Blocks => Some(0.0),
+            Outcome::AsOwn | Outcome::IfBehind | Outcome::Unknown => None,
+        }
+    }
+
+    fn known(&self, outcomes: &TexelOutcomes, pixels: &TilePixels<'_>, values: &mut [f32; 64]) -> Known {
+        let map = &self.0.maps[outcomes.view];
+        let mut known = Known::default();
+        for bit in bits_of(pixels.mask) {
+            let texel = map.view.project(pixels.position(bit)).map(|ndc| map.texel(ndc));
+            let v = texel.and_then(|[column, row]| self.constant(outcomes.at(column as i32, row as i32)));
+            if let Some(v) = v {
+                values[bit] = v;
+                known.answered |= 1 << bit;
+            }
+        }
+        known
+    }
+
+    fn answer(&self, _: Option<&TexelOutcomes>, receiver: &Receiver, _: &mut u64) -> f32 {
+        self.0.hard(receiver)
     }
 }
 

@@ -9,6 +9,7 @@ pub mod depth_pyramid;
 pub mod filter_maps;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+mod grid_cells;
 mod hard;
 pub mod light_cone;
 pub mod light_maps;
@@ -25,6 +26,7 @@ pub mod pixel_hash;
 pub mod poisson_disk;
 pub mod receiver_plane;
 pub mod search_region;
+pub mod shade_patches;
 pub mod taps;
 mod technique;
 pub mod texel_outcomes;

@@ -15,8 +15,9 @@ use crate::cpu;
 use crate::filter_maps::FilterMaps;
 use crate::light_maps::{LightMaps, Receiver, ShadowMapView};
 use crate::params::ShadowMapParams;
-use crate::patches::Form;
+use crate::patches::{Form, Outcome};
 use crate::pcf::Filter;
+use crate::shade_patches::{Known, PatchLookup, TilePixels};
 use crate::texel_outcomes::TexelOutcomes;
 
 /// The variant: maps, ids and a filter.
@@ -34,8 +35,28 @@ impl<'a> ObjectId<'a> {
         report.bytes += objects.iter().map(|ids| size_of_val(ids.as_slice()) as u64).sum::<u64>();
         Self { maps: FilterMaps::new(maps, params.skip, report), filter: Filter::new(params), objects }
     }
+}
 
-    fn answer(&self, receiver: &Receiver, outcomes: Option<&TexelOutcomes>, lit: &mut u64) -> f32 {
+impl PatchLookup for ObjectId<'_> {
+    const FORM: Form = Form::Ids;
+
+    fn reach(&self) -> [f64; 2] {
+        self.filter.reads()
+    }
+
+    fn object_of(&self, view: usize, index: usize) -> u32 {
+        self.objects[view][index]
+    }
+
+    fn constant(&self, outcome: Outcome) -> Option<f32> {
+        Filter::constant(outcome)
+    }
+
+    fn known(&self, outcomes: &TexelOutcomes, pixels: &TilePixels<'_>, values: &mut [f32; 64]) -> Known {
+        self.filter.known(&self.maps, outcomes, pixels, values)
+    }
+
+    fn answer(&self, outcomes: Option<&TexelOutcomes>, receiver: &Receiver, lit: &mut u64) -> f32 {
         self.filter.answer(&self.maps, receiver, outcomes, lit, |taps, stored| {
             self.objects[stored.view][stored.index] != receiver.object && taps.is_behind(stored)
         })
@@ -44,21 +65,13 @@ impl<'a> ObjectId<'a> {
 
 impl PreparedVariant for ObjectId<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage, report: &mut Report) {
-        self.filter.shade(
-            &self.maps,
-            gbuffer,
-            visibility,
-            Form::Ids,
-            |view, index| self.objects[view][index],
-            |receiver, outcomes, lit| self.answer(receiver, outcomes, lit),
-            report,
-        );
+        Filter::shade(&self.maps, gbuffer, visibility, self, report);
     }
 
     fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32], report: &mut Report) {
         report.time("shade.filter", |_| {
             cpu::filter_points(&self.maps.maps, points, visibility, |receiver| {
-                self.answer(receiver, None, &mut 0)
+                self.answer(None, receiver, &mut 0)
             });
         });
     }

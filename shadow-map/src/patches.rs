@@ -45,6 +45,26 @@ pub struct Patch {
     tolerance: [f32; 2],
 }
 
+impl Patch {
+    /// Whether both are parts of one triangle, seen from one side.
+    #[inline]
+    pub fn is_of_surface(&self, other: &Self) -> bool {
+        self.triangle == other.triangle && self.normal == other.normal
+    }
+
+    /// Both parts of one triangle as one. Of several tiles the mask says nothing.
+    #[must_use]
+    pub fn joined(self, other: &Self) -> Self {
+        Self {
+            mask: self.mask | other.mask,
+            bounds: self.bounds.union(other.bounds),
+            along: [self.along[0].min(other.along[0]), self.along[1].max(other.along[1])],
+            tolerance: [self.tolerance[0].min(other.tolerance[0]), self.tolerance[1].max(other.tolerance[1])],
+            ..self
+        }
+    }
+}
+
 /// The patches of one row of tiles, and for each of its tiles where they end.
 #[derive(Clone, Debug, Default)]
 pub struct PatchRow {
@@ -55,8 +75,13 @@ pub struct PatchRow {
 impl PatchRow {
     /// The patches of the tile in `column`.
     pub fn of(&self, column: usize) -> &[Patch] {
-        let start = if column == 0 { 0 } else { self.ends[column - 1] };
-        &self.patches[start as usize..self.ends[column] as usize]
+        self.of_tiles(column..column + 1)
+    }
+
+    /// The patches of the tiles in some columns.
+    pub fn of_tiles(&self, columns: Range<usize>) -> &[Patch] {
+        let end = |column: usize| if column == 0 { 0 } else { self.ends[column - 1] as usize };
+        &self.patches[end(columns.start)..end(columns.end)]
     }
 }
 
@@ -144,6 +169,11 @@ pub enum Outcome {
     Clear,
     /// It shadows each of them.
     Blocks,
+    /// To a filter, it shadows those of them that their own texel shadows: it rises above each, each lies behind its plane,
+    /// and it is near each.
+    AsOwn,
+    /// To a filter, it shadows those of them that lie behind its plane.
+    IfBehind,
     /// Each has to ask.
     Unknown,
 }
@@ -204,8 +234,8 @@ pub struct Questions {
     /// From the middle to the light, a unit vector, and what it differs by for any other pixel.
     to_light: DVec3,
     turn: f64,
-    /// At least 1 + tan θ of every pixel.
-    slope: f64,
+    /// At most and at least as much as 1 + tan θ of every pixel.
+    slope: [f64; 2],
     /// Largest coordinate of scene and light: windows of maps reach as far.
     magnitude: f64,
     /// The last stored triangle asked about, and its plane.
@@ -236,11 +266,17 @@ impl Questions {
             }
         };
         // In f32 the cosine is off by less than 16 roundings, and the root of 1 − cos² by 2⁻¹⁰ at most.
-        let cos = normal.dot(to_light) - turn - 16.0 * ROUNDING;
-        if cos.is_nan() || cos <= 1.0 / 64.0 {
+        let off = turn + 16.0 * ROUNDING;
+        let cos = [-off, off].map(|off| normal.dot(to_light) + off);
+        if cos[0].is_nan() || cos[0] <= 1.0 / 64.0 {
             return None;
         }
-        let slope = 1.0 + (1.0 - cos * cos).max(0.0).sqrt() / cos * (1.0 + 1.0 / 256.0) + 1.0 / 256.0;
+        let tangent = cos.map(|cos| (1.0 - cos * cos).max(0.0).sqrt() / cos);
+        let rounded_tangent = [
+            (tangent[1] * (1.0 - 1.0 / 256.0) - 1.0 / 256.0).max(0.0),
+            tangent[0] * (1.0 + 1.0 / 256.0) + 1.0 / 256.0,
+        ];
+        let slope = rounded_tangent.map(|tangent| 1.0 + tangent);
         Some(Self {
             center,
             half,
@@ -290,9 +326,7 @@ impl Questions {
         if low - error >= -self.tolerance[0] {
             return Outcome::Clear;
         }
-        if high + error >= -self.tolerance[1] {
-            return Outcome::Unknown;
-        }
+        let is_behind = high + error < -self.tolerance[1];
         // Question 1.
         let (stored, texel) = stored();
         let (stored, texel) = (stored.as_dvec3(), f64::from(texel));
@@ -300,19 +334,27 @@ impl Questions {
         let farthest = way.length() + self.radius;
         // In f32 from points or from the view's own axes: sums of a dozen terms, none above the scene's size.
         let error = 64.0 * ROUNDING * (farthest + 8.0 * self.magnitude);
-        let rise = self.normal.dot(stored) - self.along[1];
-        if rise - error <= self.tolerance[1] + texel * f64::from(DEPTH_POSITION_ERROR) {
+        let [most, least] = self.along.map(|along| self.normal.dot(stored) - along);
+        let snapping = texel * f64::from(DEPTH_POSITION_ERROR);
+        if most + error <= self.tolerance[0] + snapping {
+            return Outcome::Clear;
+        }
+        if least - error <= self.tolerance[1] + snapping || !is_behind && form == Form::Hard {
             return Outcome::Unknown;
         }
         if form == Form::Ids {
-            return Outcome::Blocks;
+            return if is_behind { Outcome::Blocks } else { Outcome::IfBehind };
         }
         // Question 3.
         let along = way.dot(self.to_light);
-        let lateral =
-            (way - self.to_light * along).length() + self.radius + farthest * (self.turn + 1.0 / 512.0);
-        let least = along - self.radius - farthest * (self.turn + 32.0 * ROUNDING);
-        let near = if form == Form::Filter { texel.max(2.0 * lateral) } else { texel };
-        if least > near * self.slope * (1.0 + 1.0 / 1024.0) { Outcome::Blocks } else { Outcome::Unknown }
+        let lateral = (way - self.to_light * along).length();
+        let off = self.radius + farthest * (self.turn + 1.0 / 512.0);
+        let off_along = self.radius + farthest * (self.turn + 32.0 * ROUNDING);
+        let near = |lateral: f64| if form == Form::Filter { texel.max(2.0 * lateral) } else { texel };
+        if along - off_along > near(lateral + off) * self.slope[1] * (1.0 + 1.0 / 1024.0) {
+            return if is_behind { Outcome::Blocks } else { Outcome::IfBehind };
+        }
+        let is_near = (along + off_along) * (1.0 + 1.0 / 1024.0) <= near(lateral - off) * self.slope[0];
+        if form == Form::Filter && is_behind && is_near { Outcome::AsOwn } else { Outcome::Unknown }
     }
 }

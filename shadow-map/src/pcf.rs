@@ -15,13 +15,15 @@ use scene_core::{GBuffer, Report, VisibilityImage};
 use crate::PreparedVariant;
 use crate::cpu;
 use crate::filter_maps::FilterMaps;
+use crate::grid_cells::known_of_grid;
 use crate::light_maps::{LightMaps, Receiver, ShadowMapView};
 use crate::params::{Kernel, ShadowMapParams};
-use crate::patches::{Form, Outcome, Patch, Questions, patches_of};
+use crate::patches::{Form, Outcome, patches_of};
 use crate::pixel_hash::pixel_numbers;
 use crate::poisson_disk::poisson_disk;
+use crate::shade_patches::{Known, PatchLookup, TilePixels, shade_patches};
 use crate::taps::{Stored, Taps};
-use crate::texel_outcomes::{TexelOutcomes, bits, patches_pay};
+use crate::texel_outcomes::{TexelOutcomes, bits_of, patches_pay};
 
 /// The variant: maps and a filter.
 #[derive(Debug)]
@@ -34,29 +36,37 @@ impl<'a> Pcf<'a> {
     pub(crate) fn new(maps: LightMaps<'a>, params: &ShadowMapParams, report: &mut Report) -> Self {
         Self { maps: FilterMaps::new(maps, params.skip, report), filter: Filter::new(params) }
     }
+}
 
-    fn answer(&self, receiver: &Receiver, outcomes: Option<&TexelOutcomes>, lit: &mut u64) -> f32 {
+impl PatchLookup for Pcf<'_> {
+    const FORM: Form = Form::Filter;
+
+    fn reach(&self) -> [f64; 2] {
+        self.filter.reads()
+    }
+
+    fn constant(&self, outcome: Outcome) -> Option<f32> {
+        Filter::constant(outcome)
+    }
+
+    fn known(&self, outcomes: &TexelOutcomes, pixels: &TilePixels<'_>, values: &mut [f32; 64]) -> Known {
+        self.filter.known(&self.maps, outcomes, pixels, values)
+    }
+
+    fn answer(&self, outcomes: Option<&TexelOutcomes>, receiver: &Receiver, lit: &mut u64) -> f32 {
         self.filter.answer(&self.maps, receiver, outcomes, lit, |taps, stored| taps.blocks(stored))
     }
 }
 
 impl PreparedVariant for Pcf<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage, report: &mut Report) {
-        self.filter.shade(
-            &self.maps,
-            gbuffer,
-            visibility,
-            Form::Filter,
-            |_, _| GBuffer::NOTHING,
-            |receiver, outcomes, lit| self.answer(receiver, outcomes, lit),
-            report,
-        );
+        Filter::shade(&self.maps, gbuffer, visibility, self, report);
     }
 
     fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32], report: &mut Report) {
         report.time("shade.filter", |_| {
             cpu::filter_points(&self.maps.maps, points, visibility, |receiver| {
-                self.answer(receiver, None, &mut 0)
+                self.answer(None, receiver, &mut 0)
             });
         });
     }
@@ -88,41 +98,36 @@ impl Filter {
         }
     }
 
-    /// `shade.filter`: V of every pixel by `answer`, which is given what the texels are to the pixel's patch.
-    #[expect(clippy::too_many_arguments, reason = "what is read, what is written, and three questions")]
-    pub(crate) fn shade(
-        &self,
+    /// `shade.filter`: V of every pixel by `lookup`.
+    pub(crate) fn shade<L: PatchLookup>(
         maps: &FilterMaps<'_>,
         gbuffer: &GBuffer,
         visibility: &mut VisibilityImage,
-        form: Form,
-        object_of: impl Fn(usize, usize) -> u32 + Sync,
-        answer: impl Fn(&Receiver, Option<&TexelOutcomes>, &mut u64) -> f32 + Sync,
+        lookup: &L,
         report: &mut Report,
     ) {
         let lit = report.time("shade.filter", |_| {
-            let reach = match self {
-                Self::Grid(side) => [f64::from(*side) * 0.5, f64::from(*side) * 0.5 + 1.0],
-                Self::Disk { radius, .. } => [f64::from(*radius) + 1.0; 2],
-            };
-            if !maps.skip || !patches_pay(&maps.maps, gbuffer, reach) {
-                let one = |receiver: &Receiver, lit: &mut u64| answer(receiver, None, lit);
+            if !maps.skip || !patches_pay(&maps.maps, gbuffer, lookup.reach()) {
+                let one = |receiver: &Receiver, lit: &mut u64| lookup.answer(None, receiver, lit);
                 return cpu::filter_pixels(&maps.maps, gbuffer, visibility, one);
             }
-            let fill = |patch: &Patch, questions: &mut Questions, outcomes: &mut TexelOutcomes| {
-                outcomes.fill(&maps.maps, patch, questions, form, reach, &object_of)
-            };
-            // What blocks everywhere is a sum of weights, which rounding may keep from all.
-            let constant = |outcome| (outcome == Outcome::Clear).then_some(1.0);
             let patches = patches_of(&maps.maps.scene, gbuffer);
-            let values = &mut visibility.values;
-            let ask = |outcomes: Option<&TexelOutcomes>, receiver: &Receiver, lit: &mut u64| {
-                answer(receiver, outcomes, lit)
-            };
-            let known = |outcomes: &TexelOutcomes, point, pixel| self.known(maps, point, pixel, outcomes);
-            cpu::shade_patches(&maps.maps, gbuffer, &patches, values, fill, constant, known, ask).iter().sum()
+            shade_patches(&maps.maps, gbuffer, &patches, &mut visibility.values, lookup).iter().sum()
         });
         report.skip("filters", lit);
+    }
+
+    /// Texels that are read before and after the receiver's place.
+    pub(crate) fn reads(&self) -> [f64; 2] {
+        match self {
+            Self::Grid(side) => [f64::from(*side) * 0.5, f64::from(*side) * 0.5 + 1.0],
+            Self::Disk { radius, .. } => [f64::from(*radius) + 1.0; 2],
+        }
+    }
+
+    /// V where all texels are alike. What blocks everywhere is a sum of weights, which rounding may keep from all.
+    pub(crate) fn constant(outcome: Outcome) -> Option<f32> {
+        (outcome == Outcome::Clear).then_some(1.0)
     }
 
     /// V of `receiver`: one less the share of taps that `blocks` says shadow it, where that is not known from `outcomes`
@@ -149,63 +154,50 @@ impl Filter {
         let ask = |column, row| taps.risen(column, row).is_some_and(|stored| blocks(&taps, &stored));
         match self {
             Self::Grid(side) => match outcomes {
-                Some(outcomes) => grid_of_bits(*side, taps.texel, |column, row| {
-                    let all = || [0, u128::MAX >> (127 - side)];
-                    let [blocked, unknown] = outcomes.run(column, row, (side + 1) as u32).unwrap_or_else(all);
-                    bits(unknown)
+                Some(outcomes) if *side < 64 => grid_of_bits(*side, taps.texel, |column, row| {
+                    let run = outcomes.run(column, row, (side + 1) as u32);
+                    let [blocked, open] =
+                        run.map_or([0, u64::MAX >> (63 - side)], |row| [row.blocks, row.open()]);
+                    bits_of(open)
                         .filter(|&bit| ask(column + bit as i32, row))
                         .fold(blocked, |blocked, bit| blocked | 1 << bit)
                 }),
-                None => grid(*side, taps.texel, ask),
+                _ => grid(*side, taps.texel, ask),
             },
             Self::Disk { .. } => self.disk(receiver.pixel, taps.texel, |column, row| {
                 match outcomes.map_or(Outcome::Unknown, |outcomes| outcomes.at(column, row)) {
-                    Outcome::Unknown => ask(column, row),
-                    known => known == Outcome::Blocks,
+                    Outcome::Blocks => true,
+                    Outcome::Clear => false,
+                    Outcome::AsOwn | Outcome::IfBehind | Outcome::Unknown => ask(column, row),
                 }
             }),
         }
     }
 
-    /// V where each texel in reach is known.
-    #[inline]
-    fn known(
+    /// V of the pixels for which each texel in reach is known.
+    pub(crate) fn known(
         &self,
         maps: &FilterMaps<'_>,
-        point: Vec3,
-        pixel: [u32; 2],
         outcomes: &TexelOutcomes,
-    ) -> Option<f32> {
-        let map = &maps.maps.maps[outcomes.view];
-        let texel = map.texel_at(map.view.project_beyond(point)?);
-        match self {
-            Self::Grid(side) => {
-                let (first, count) = (first_of_grid(*side, texel), (side + 1) as u32);
-                let run = |row: i32| outcomes.run(first[0], first[1] + row, count);
-                let mut any = 0;
-                for row in 0..=*side {
-                    let [blocked, unknown] = run(row)?;
-                    if unknown != 0 {
-                        return None;
-                    }
-                    any |= blocked;
-                }
-                if any == 0 {
-                    return Some(1.0);
-                }
-                let blocked = |_, row| outcomes.run(first[0], row, count).map_or(0, |[blocked, _]| blocked);
-                Some(grid_of_bits(*side, texel, blocked))
-            }
-            Self::Disk { .. } => {
-                let is_known = Cell::new(true);
-                let v = self.disk(pixel, texel, |column, row| {
-                    let outcome = outcomes.at(column, row);
-                    is_known.set(is_known.get() && outcome != Outcome::Unknown);
-                    outcome == Outcome::Blocks
-                });
-                is_known.get().then_some(v)
-            }
+        pixels: &TilePixels<'_>,
+        values: &mut [f32; 64],
+    ) -> Known {
+        if let Self::Grid(side) = self {
+            return known_of_grid(*side, maps, outcomes, pixels, values);
         }
+        let map = &maps.maps.maps[outcomes.view];
+        let mut known = Known::default();
+        for bit in bits_of(pixels.mask) {
+            let Some(ndc) = map.view.project_beyond(pixels.position(bit)) else { continue };
+            let is_known = Cell::new(true);
+            values[bit] = self.disk(pixels.at(bit), map.texel_at(ndc), |column, row| {
+                let outcome = outcomes.at(column, row);
+                is_known.set(is_known.get() && matches!(outcome, Outcome::Clear | Outcome::Blocks));
+                outcome == Outcome::Blocks
+            });
+            known.answered |= u64::from(is_known.get()) << bit;
+        }
+        known
     }
 
     /// V by some texels of a circle; none of a grid's.
@@ -240,13 +232,13 @@ impl Filter {
 
 /// The first column and row of a grid of `side` + 1 texels around a place.
 #[inline]
-fn first_of_grid(side: i32, texel: Vec2) -> [i32; 2] {
+pub(crate) fn first_of_grid(side: i32, texel: Vec2) -> [i32; 2] {
     (texel - side as f32 * 0.5).floor().to_array().map(|at| at as i32)
 }
 
 /// The weight of a row or column of a grid, the first and the last by the share of it in the square.
 #[inline]
-fn weight(side: i32, step: i32, fraction: f32) -> f32 {
+pub(crate) fn weight(side: i32, step: i32, fraction: f32) -> f32 {
     match step {
         0 => 1.0 - fraction,
         step if step == side => fraction,
@@ -274,22 +266,15 @@ fn grid(side: i32, texel: Vec2, is_blocked: impl Fn(i32, i32) -> bool) -> f32 {
 }
 
 /// [`grid`] with a bit for each texel of a row that blocks, from the column and in the row that `blocked` is given: the same
-/// sums in the same order.
+/// sums in the same order. Of 63 texels a side at most.
 #[inline]
-fn grid_of_bits(side: i32, texel: Vec2, blocked: impl Fn(i32, i32) -> u128) -> f32 {
+fn grid_of_bits(side: i32, texel: Vec2, blocked: impl Fn(i32, i32) -> u64) -> f32 {
     let first = first_of_grid(side, texel);
     let fraction = texel - side as f32 * 0.5 - Vec2::new(first[0] as f32, first[1] as f32);
-    let whole = u128::MAX >> (127 - side);
-    let mut all = 0.0;
-    (0..=side).for_each(|step| all += weight(side, step, fraction.x));
     let mut dark = 0.0;
     for row in 0..=side {
-        let blocked = blocked(first[0], first[1] + row);
-        let line = if blocked == whole {
-            all
-        } else {
-            bits(blocked).fold(0.0, |line, step| line + weight(side, step as i32, fraction.x))
-        };
+        let blocked = bits_of(blocked(first[0], first[1] + row));
+        let line = blocked.fold(0.0, |line, step| line + weight(side, step as i32, fraction.x));
         dark += line * weight(side, row, fraction.y);
     }
     (1.0 - dark / (side * side) as f32).clamp(0.0, 1.0)

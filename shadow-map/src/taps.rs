@@ -39,6 +39,14 @@ pub struct Taps<'m> {
     own: Cell<Option<bool>>,
 }
 
+/// Column and row of the texel that a receiver at `texel` is in, of a map of `size` texels a side; beside the map, too. NDC 1
+/// belongs to the last one.
+#[inline]
+pub(crate) fn own_texel(texel: Vec2, size: u32) -> [i32; 2] {
+    let last = |at: i32| if at == size as i32 { at - 1 } else { at };
+    texel.to_array().map(|at| last(at.floor() as i32))
+}
+
 /// A stored surface that rises above the receiver's plane.
 #[derive(Clone, Copy, Debug)]
 pub struct Stored {
@@ -222,11 +230,8 @@ impl<'m> Taps<'m> {
 
     /// The surface in the receiver's own texel, if it shadows the receiver: the hard lookup.
     pub fn own_blocker(&self) -> Option<Stored> {
-        let [column, row] = self.texel.to_array().map(|at| at.floor() as i32);
-        // NDC 1 belongs to the last texel.
-        let size = self.map().map.width as i32;
-        let last = |at: i32| if at == size { size - 1 } else { at };
-        self.risen(last(column), last(row)).filter(|stored| {
+        let [column, row] = own_texel(self.texel, self.map().map.width);
+        self.risen(column, row).filter(|stored| {
             let corners = || self.maps.maps.scene.corners(self.triangle(stored));
             let light = self.maps.maps.light.center();
             self.is_behind(stored) && (!self.is_near(stored) || meets(corners(), self.receiver.point, light))

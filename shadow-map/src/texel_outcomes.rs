@@ -22,20 +22,57 @@ pub struct TexelOutcomes {
     columns: usize,
     rows: Vec<Row>,
     /// Whether a texel of each kind is among them.
-    has: [bool; 3],
+    has: [bool; 5],
 }
 
-/// A bit for each texel of a row.
-#[derive(Clone, Copy, Debug, Default)]
-struct Row {
-    blocks: u64,
-    unknown: u64,
+/// A bit for each texel of a row, by what it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Row {
+    /// [`Outcome::Blocks`].
+    pub blocks: u64,
+    /// [`Outcome::AsOwn`].
+    pub as_own: u64,
+    /// [`Outcome::IfBehind`].
+    pub if_behind: u64,
+    /// [`Outcome::Unknown`].
+    pub unknown: u64,
+}
+
+impl Row {
+    /// Each word changed alike.
+    #[inline]
+    fn map(self, change: impl Fn(u64) -> u64) -> Self {
+        let Self { blocks, as_own, if_behind, unknown } = self;
+        Self {
+            blocks: change(blocks),
+            as_own: change(as_own),
+            if_behind: change(if_behind),
+            unknown: change(unknown),
+        }
+    }
+
+    /// Those of which more is to be asked than the table knows.
+    #[inline]
+    pub fn open(&self) -> u64 {
+        self.as_own | self.if_behind | self.unknown
+    }
+}
+
+/// What a patch is, and what is read for it.
+#[derive(Clone, Copy, Debug)]
+pub struct Reads<'t> {
+    /// Which questions are asked.
+    pub form: Form,
+    /// Texels that lookups read to the left of and above the receiver's place, and to the right and below.
+    pub reach: [f64; 2],
+    /// Texels of a table, at most: as many as would be read without it. To ask for a texel costs about as much as to read it.
+    pub most: usize,
+    /// A table for a patch that this one is a part of: only what it leaves open is asked again.
+    pub within: Option<&'t TexelOutcomes>,
 }
 
 impl TexelOutcomes {
-    /// Fills the table for lookups that read `before` texels to the left of and above the receiver's place, and `after` to
-    /// the right and below, in texels. False if no one view surely holds all of them, or if they are more than the pixels would
-    /// read one by one: to ask for a texel costs about as much as to read it.
+    /// Fills the table. False if no one view surely holds all of the texels, or if they are too many.
     ///
     /// `object_of` is asked by [`Form::Ids`] for the object in a texel of a view.
     pub fn fill(
@@ -43,10 +80,10 @@ impl TexelOutcomes {
         maps: &LightMaps<'_>,
         patch: &Patch,
         questions: &mut Questions,
-        form: Form,
-        [before, after]: [f64; 2],
+        reads: Reads<'_>,
         object_of: impl Fn(usize, usize) -> u32,
     ) -> bool {
+        let Reads { form, reach: [before, after], most, within } = reads;
         let is_lone = maps.maps.len() == 1;
         let found = maps.maps.iter().enumerate().find_map(|(index, map)| {
             let (min, max) = texels_of(map, questions)?;
@@ -64,16 +101,21 @@ impl TexelOutcomes {
         let first = (min - before).floor().as_ivec2().to_array();
         let last = (max + after).floor().as_ivec2().to_array();
         let [columns, rows] = [0, 1].map(|axis| (last[axis] - first[axis]) as usize + 1);
-        let reads = patch.mask.count_ones() as usize * (before + after + 1.0).powi(2) as usize;
-        if columns > MOST_COLUMNS || columns * rows > MOST_TEXELS.min(reads) {
+        if columns > MOST_COLUMNS || columns * rows > most.min(MOST_TEXELS) {
             return false;
         }
-        (self.view, self.first, self.columns, self.has) = (view, first, columns, [false; 3]);
+        (self.view, self.first, self.columns, self.has) = (view, first, columns, [false; 5]);
         self.rows.clear();
+        let within = within.filter(|within| within.view == view);
         let texel = 2.0 / size as f32;
+        let whole = u64::MAX >> (64 - columns);
         for row in first[1]..=last[1] {
-            let mut bits = Row::default();
-            for (bit, column) in (first[0]..=last[0]).enumerate() {
+            let known = within.and_then(|within| within.run(first[0], row, columns as u32));
+            let asked = known.map_or(whole, |known| known.if_behind | known.unknown);
+            let mut bits = known.unwrap_or_default();
+            (bits.if_behind, bits.unknown) = (0, 0);
+            for bit in bits_of(asked) {
+                let column = first[0] + bit as i32;
                 let is_inside = (0..size as i32).contains(&column) && (0..size as i32).contains(&row);
                 let index = if is_inside { row as usize * size + column as usize } else { 0 };
                 let depth = if is_inside { map.map.depth[index] } else { 0.0 };
@@ -90,51 +132,59 @@ impl TexelOutcomes {
                 match outcome {
                     Outcome::Clear => {}
                     Outcome::Blocks => bits.blocks |= 1 << bit,
+                    Outcome::AsOwn => bits.as_own |= 1 << bit,
+                    Outcome::IfBehind => bits.if_behind |= 1 << bit,
                     Outcome::Unknown => bits.unknown |= 1 << bit,
                 }
-                self.has[outcome as usize] = true;
+            }
+            for (outcome, texels) in [
+                (Outcome::Clear, whole & !(bits.blocks | bits.open())),
+                (Outcome::Blocks, bits.blocks),
+                (Outcome::AsOwn, bits.as_own),
+                (Outcome::IfBehind, bits.if_behind),
+                (Outcome::Unknown, bits.unknown),
+            ] {
+                self.has[outcome as usize] |= texels != 0;
             }
             self.rows.push(bits);
         }
         true
     }
 
-    /// What all texels are, if it is one and the same.
+    /// What all texels are, if it is one and the same that needs no more questions.
     pub fn all(&self) -> Option<Outcome> {
         match self.has {
-            [true, false, false] => Some(Outcome::Clear),
-            [false, true, false] => Some(Outcome::Blocks),
+            [true, false, false, false, false] => Some(Outcome::Clear),
+            [false, true, false, false, false] => Some(Outcome::Blocks),
             _ => None,
         }
+    }
+
+    /// Whether a texel of this kind is among them.
+    pub fn has(&self, outcome: Outcome) -> bool {
+        self.has[outcome as usize]
     }
 
     /// What one texel is; `Unknown` outside the table.
     #[inline]
     pub fn at(&self, column: i32, row: i32) -> Outcome {
-        let (column, row) = ((column - self.first[0]) as usize, (row - self.first[1]) as usize);
-        match self.rows.get(row) {
-            Some(bits) if column < self.columns => {
-                if bits.unknown >> column & 1 == 1 {
-                    Outcome::Unknown
-                } else if bits.blocks >> column & 1 == 1 {
-                    Outcome::Blocks
-                } else {
-                    Outcome::Clear
-                }
-            }
-            _ => Outcome::Unknown,
+        let Some(bits) = self.run(column, row, 1) else { return Outcome::Unknown };
+        match bits {
+            Row { blocks: 1, .. } => Outcome::Blocks,
+            Row { as_own: 1, .. } => Outcome::AsOwn,
+            Row { if_behind: 1, .. } => Outcome::IfBehind,
+            Row { unknown: 1, .. } => Outcome::Unknown,
+            _ => Outcome::Clear,
         }
     }
 
-    /// A bit for each of the `count` texels from `column` on that block and that are unknown; `None` if they are not all in
-    /// the table.
+    /// The `count` texels from `column` on, 64 at most; `None` if they are not all in the table.
     #[inline]
-    pub fn run(&self, column: i32, row: i32, count: u32) -> Option<[u128; 2]> {
-        let (column, row) = ((column - self.first[0]) as usize, (row - self.first[1]) as usize);
-        let bits = self.rows.get(row)?;
+    pub fn run(&self, column: i32, row: i32, count: u32) -> Option<Row> {
+        let column = usize::try_from(column - self.first[0]).ok()?;
+        let bits = self.rows.get(usize::try_from(row - self.first[1]).ok()?)?;
         let mask = u64::MAX >> (64 - count.clamp(1, 64));
-        (column < self.columns && column + count as usize <= self.columns)
-            .then(|| [bits.blocks, bits.unknown].map(|bits| u128::from(bits >> column & mask)))
+        (column + count as usize <= self.columns).then(|| bits.map(|bits| bits >> column & mask))
     }
 }
 
@@ -178,7 +228,7 @@ pub(crate) fn patches_pay(maps: &LightMaps<'_>, gbuffer: &GBuffer, [before, afte
 
 /// The bits that are set, from the lowest on.
 #[inline]
-pub(crate) fn bits(mut mask: u128) -> impl Iterator<Item = usize> {
+pub(crate) fn bits_of(mut mask: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let bit = mask.trailing_zeros() as usize;
         let more = mask != 0;
