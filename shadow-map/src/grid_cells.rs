@@ -34,7 +34,7 @@ pub(crate) fn known_of_grid(
     values: &mut [f32; 64],
 ) -> Known {
     let map = &maps.maps.maps[outcomes.view];
-    let by_own = outcomes.has(Outcome::AsOwn);
+    let by_own = outcomes.asks_own();
     let (mut places, mut fractions) = ([[[0; 2]; 2]; 64], [Vec2::ZERO; 64]);
     let mut left: u64 = 0;
     for bit in bits_of(pixels.mask) {
@@ -69,17 +69,6 @@ pub(crate) fn known_of_grid(
     known
 }
 
-/// The table's row with what is as the pixels' own texel told, if that is known.
-fn told(mut row: Row, own: Outcome) -> Row {
-    match own {
-        Outcome::Blocks => row.blocks |= row.as_own,
-        Outcome::Clear => {}
-        _ => row.unknown |= row.as_own,
-    }
-    row.as_own = 0;
-    row
-}
-
 impl Cell {
     /// V of all of them, and whether planes were asked; `None` where more has to be.
     fn sum(
@@ -91,7 +80,7 @@ impl Cell {
         pixels: &TilePixels<'_>,
         values: &mut [f32; 64],
     ) -> Option<bool> {
-        let row = |step: i32| Some(told(outcomes.run(first[0], first[1] + step, (side + 1) as u32)?, own));
+        let row = |step: i32| Some(outcomes.run(first[0], first[1] + step, (side + 1) as u32)?.told(own));
         let (mut any, mut asked) = (0, 0);
         for step in 0..=side {
             let row = row(step)?;

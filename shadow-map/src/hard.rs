@@ -78,7 +78,7 @@ impl PatchLookup for HardLookup<'_> {
         match outcome {
             Outcome::Clear => Some(1.0),
             Outcome::Blocks => Some(0.0),
-            Outcome::AsOwn | Outcome::IfBehind | Outcome::Unknown => None,
+            _ => None,
         }
     }
 

@@ -169,9 +169,12 @@ pub enum Outcome {
     Clear,
     /// It shadows each of them.
     Blocks,
-    /// To a filter, it shadows those of them that their own texel shadows: it rises above each, each lies behind its plane,
-    /// and it is near each.
+    /// To a filter, it shadows those of them that their own texel shadows: it is near each, and before it.
     AsOwn,
+    /// To a filter, it shadows none but those: it is near each.
+    AtMostOwn,
+    /// To a filter, it shadows those at least: it is before each.
+    AtLeastOwn,
     /// To a filter, it shadows those of them that lie behind its plane.
     IfBehind,
     /// Each has to ask.
@@ -339,11 +342,12 @@ impl Questions {
         if most + error <= self.tolerance[0] + snapping {
             return Outcome::Clear;
         }
-        if least - error <= self.tolerance[1] + snapping || !is_behind && form == Form::Hard {
-            return Outcome::Unknown;
-        }
-        if form == Form::Ids {
-            return if is_behind { Outcome::Blocks } else { Outcome::IfBehind };
+        let is_risen = least - error > self.tolerance[1] + snapping;
+        match form {
+            Form::Hard if !(is_risen && is_behind) => return Outcome::Unknown,
+            Form::Ids if !is_risen => return Outcome::Unknown,
+            Form::Ids => return if is_behind { Outcome::Blocks } else { Outcome::IfBehind },
+            Form::Hard | Form::Filter => {}
         }
         // Question 3.
         let along = way.dot(self.to_light);
@@ -351,10 +355,16 @@ impl Questions {
         let off = self.radius + farthest * (self.turn + 1.0 / 512.0);
         let off_along = self.radius + farthest * (self.turn + 32.0 * ROUNDING);
         let near = |lateral: f64| if form == Form::Filter { texel.max(2.0 * lateral) } else { texel };
-        if along - off_along > near(lateral + off) * self.slope[1] * (1.0 + 1.0 / 1024.0) {
-            return if is_behind { Outcome::Blocks } else { Outcome::IfBehind };
+        let is_far = along - off_along > near(lateral + off) * self.slope[1] * (1.0 + 1.0 / 1024.0);
+        let is_near = form == Form::Filter
+            && (along + off_along) * (1.0 + 1.0 / 1024.0) <= near(lateral - off) * self.slope[0];
+        match (is_risen, is_behind) {
+            (true, true) if is_far => Outcome::Blocks,
+            (true, true) if is_near => Outcome::AsOwn,
+            (true, true) if form == Form::Filter => Outcome::AtLeastOwn,
+            (true, false) if is_far => Outcome::IfBehind,
+            _ if is_near => Outcome::AtMostOwn,
+            _ => Outcome::Unknown,
         }
-        let is_near = (along + off_along) * (1.0 + 1.0 / 1024.0) <= near(lateral - off) * self.slope[0];
-        if form == Form::Filter && is_behind && is_near { Outcome::AsOwn } else { Outcome::Unknown }
     }
 }

@@ -168,7 +168,7 @@ impl Filter {
                 match outcomes.map_or(Outcome::Unknown, |outcomes| outcomes.at(column, row)) {
                     Outcome::Blocks => true,
                     Outcome::Clear => false,
-                    Outcome::AsOwn | Outcome::IfBehind | Outcome::Unknown => ask(column, row),
+                    _ => ask(column, row),
                 }
             }),
         }

@@ -21,8 +21,9 @@ pub struct TexelOutcomes {
     pub first: [i32; 2],
     columns: usize,
     rows: Vec<Row>,
-    /// Whether a texel of each kind is among them.
-    has: [bool; 5],
+    /// Whether a texel is clear, and all rows over each other.
+    has_clear: bool,
+    has: Row,
 }
 
 /// A bit for each texel of a row, by what it is.
@@ -30,8 +31,10 @@ pub struct TexelOutcomes {
 pub struct Row {
     /// [`Outcome::Blocks`].
     pub blocks: u64,
-    /// [`Outcome::AsOwn`].
-    pub as_own: u64,
+    /// [`Outcome::AtMostOwn`], and [`Outcome::AsOwn`].
+    pub at_most_own: u64,
+    /// [`Outcome::AtLeastOwn`], and [`Outcome::AsOwn`].
+    pub at_least_own: u64,
     /// [`Outcome::IfBehind`].
     pub if_behind: u64,
     /// [`Outcome::Unknown`].
@@ -42,19 +45,44 @@ impl Row {
     /// Each word changed alike.
     #[inline]
     fn map(self, change: impl Fn(u64) -> u64) -> Self {
-        let Self { blocks, as_own, if_behind, unknown } = self;
+        let Self { blocks, at_most_own, at_least_own, if_behind, unknown } = self;
         Self {
             blocks: change(blocks),
-            as_own: change(as_own),
+            at_most_own: change(at_most_own),
+            at_least_own: change(at_least_own),
             if_behind: change(if_behind),
             unknown: change(unknown),
         }
     }
 
+    /// Either's bits.
+    fn union(self, other: Self) -> Self {
+        Self {
+            blocks: self.blocks | other.blocks,
+            at_most_own: self.at_most_own | other.at_most_own,
+            at_least_own: self.at_least_own | other.at_least_own,
+            if_behind: self.if_behind | other.if_behind,
+            unknown: self.unknown | other.unknown,
+        }
+    }
+
+    /// With what hangs on a pixel's own texel told by what that is.
+    #[inline]
+    #[must_use]
+    pub fn told(self, own: Outcome) -> Self {
+        let Self { blocks, at_most_own, at_least_own, if_behind, unknown } = self;
+        let [blocks_too, untold] = match own {
+            Outcome::Blocks => [at_least_own, at_most_own & !at_least_own],
+            Outcome::Clear => [0, at_least_own & !at_most_own],
+            _ => [0, at_least_own | at_most_own],
+        };
+        Self { blocks: blocks | blocks_too, if_behind, unknown: unknown | untold, ..Self::default() }
+    }
+
     /// Those of which more is to be asked than the table knows.
     #[inline]
     pub fn open(&self) -> u64 {
-        self.as_own | self.if_behind | self.unknown
+        self.at_most_own | self.at_least_own | self.if_behind | self.unknown
     }
 }
 
@@ -104,16 +132,18 @@ impl TexelOutcomes {
         if columns > MOST_COLUMNS || columns * rows > most.min(MOST_TEXELS) {
             return false;
         }
-        (self.view, self.first, self.columns, self.has) = (view, first, columns, [false; 5]);
+        (self.view, self.first, self.columns) = (view, first, columns);
+        (self.has_clear, self.has) = (false, Row::default());
         self.rows.clear();
         let within = within.filter(|within| within.view == view);
         let texel = 2.0 / size as f32;
         let whole = u64::MAX >> (64 - columns);
         for row in first[1]..=last[1] {
             let known = within.and_then(|within| within.run(first[0], row, columns as u32));
-            let asked = known.map_or(whole, |known| known.if_behind | known.unknown);
-            let mut bits = known.unwrap_or_default();
-            (bits.if_behind, bits.unknown) = (0, 0);
+            let less_known =
+                |known: Row| known.if_behind | known.unknown | (known.at_most_own ^ known.at_least_own);
+            let asked = known.map_or(whole, less_known);
+            let mut bits = known.map_or(Row::default(), |known| known.map(|bits| bits & !asked));
             for bit in bits_of(asked) {
                 let column = first[0] + bit as i32;
                 let is_inside = (0..size as i32).contains(&column) && (0..size as i32).contains(&row);
@@ -129,23 +159,22 @@ impl TexelOutcomes {
                         (stored, map.view.half_diagonal(depth) * texel)
                     })
                 };
+                let bit = 1 << bit;
                 match outcome {
                     Outcome::Clear => {}
-                    Outcome::Blocks => bits.blocks |= 1 << bit,
-                    Outcome::AsOwn => bits.as_own |= 1 << bit,
-                    Outcome::IfBehind => bits.if_behind |= 1 << bit,
-                    Outcome::Unknown => bits.unknown |= 1 << bit,
+                    Outcome::Blocks => bits.blocks |= bit,
+                    Outcome::AsOwn => {
+                        (bits.at_most_own, bits.at_least_own) =
+                            (bits.at_most_own | bit, bits.at_least_own | bit)
+                    }
+                    Outcome::AtMostOwn => bits.at_most_own |= bit,
+                    Outcome::AtLeastOwn => bits.at_least_own |= bit,
+                    Outcome::IfBehind => bits.if_behind |= bit,
+                    Outcome::Unknown => bits.unknown |= bit,
                 }
             }
-            for (outcome, texels) in [
-                (Outcome::Clear, whole & !(bits.blocks | bits.open())),
-                (Outcome::Blocks, bits.blocks),
-                (Outcome::AsOwn, bits.as_own),
-                (Outcome::IfBehind, bits.if_behind),
-                (Outcome::Unknown, bits.unknown),
-            ] {
-                self.has[outcome as usize] |= texels != 0;
-            }
+            self.has_clear |= whole & !(bits.blocks | bits.open()) != 0;
+            self.has = self.has.union(bits);
             self.rows.push(bits);
         }
         true
@@ -153,16 +182,16 @@ impl TexelOutcomes {
 
     /// What all texels are, if it is one and the same that needs no more questions.
     pub fn all(&self) -> Option<Outcome> {
-        match self.has {
-            [true, false, false, false, false] => Some(Outcome::Clear),
-            [false, true, false, false, false] => Some(Outcome::Blocks),
+        match (self.has_clear, self.has.blocks != 0, self.has.open() != 0) {
+            (true, false, false) => Some(Outcome::Clear),
+            (false, true, false) => Some(Outcome::Blocks),
             _ => None,
         }
     }
 
-    /// Whether a texel of this kind is among them.
-    pub fn has(&self, outcome: Outcome) -> bool {
-        self.has[outcome as usize]
+    /// Whether what a texel is to a pixel may hang on the pixel's own.
+    pub fn asks_own(&self) -> bool {
+        self.has.at_most_own | self.has.at_least_own != 0
     }
 
     /// What one texel is; `Unknown` outside the table.
@@ -171,7 +200,9 @@ impl TexelOutcomes {
         let Some(bits) = self.run(column, row, 1) else { return Outcome::Unknown };
         match bits {
             Row { blocks: 1, .. } => Outcome::Blocks,
-            Row { as_own: 1, .. } => Outcome::AsOwn,
+            Row { at_most_own: 1, at_least_own: 1, .. } => Outcome::AsOwn,
+            Row { at_most_own: 1, .. } => Outcome::AtMostOwn,
+            Row { at_least_own: 1, .. } => Outcome::AtLeastOwn,
             Row { if_behind: 1, .. } => Outcome::IfBehind,
             Row { unknown: 1, .. } => Outcome::Unknown,
             _ => Outcome::Clear,
