@@ -4,15 +4,17 @@
 //! all of them, and only the weights at the rim differ. So rows are read once, and the sums, which are those of
 //! [`pcf`](crate::pcf) in the same order, are made for all of those pixels side by side.
 
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 
 use crate::filter_maps::FilterMaps;
+use crate::light_maps::Receiver;
 use crate::patches::Outcome;
 use crate::pcf::{first_of_grid, weight};
 use crate::receiver_plane::view_tolerance;
 use crate::shade_patches::{Known, TilePixels};
 use crate::taps::own_texel;
 use crate::texel_outcomes::{Row, TexelOutcomes, bits_of};
+use crate::texel_plane::TexelPlane;
 
 /// Pixels whose squares begin in one texel, side by side.
 struct Cell {
@@ -87,24 +89,24 @@ impl Cell {
             if row.unknown != 0 {
                 return None;
             }
-            (any, asked) = (any | row.blocks | row.if_behind, asked | row.if_behind);
+            (any, asked) = (any | row.blocks | row.if_before, asked | row.if_before);
         }
         if any == 0 {
             self.bits[..self.count].iter().for_each(|&bit| values[bit] = 1.0);
             return Some(false);
         }
-        let (mut dark, mut line, mut summed) = ([0.0f32; 64], [0.0f32; 64], None);
+        let (mut dark, mut line) = ([0.0f32; 64], [0.0f32; 64]);
+        let (mut summed, mut planes) = (None, None);
         for step in 0..=side {
             let row = row(step)?;
-            if row.if_behind != 0 {
+            if row.if_before != 0 {
                 summed = None;
-                self.line_of_some(side, row, &mut line, |column, bit| {
-                    let (view, pixel) = (outcomes.view, pixels.pixel(bit));
-                    let [column, row] = [first[0] + column, first[1] + step].map(|at| at as usize);
-                    let tolerance = maps.maps.tolerance + view_tolerance(pixels.gbuffer.depth[pixel]);
-                    let index = row * maps.maps.maps[view].map.width as usize + column;
-                    maps.is_behind_texel(view, index, pixels.position(bit), tolerance)
-                });
+                let planes = planes.get_or_insert_with(|| self.planes(maps, outcomes.view, pixels));
+                let at = |column: i32| [first[0] + column, first[1] + step];
+                let is_before = |column, lane: usize| {
+                    planes[lane].is_before(maps, outcomes.view, at(column), pixels.position(self.bits[lane]))
+                };
+                self.line_of_some(side, row, &mut line, is_before);
             } else if summed != Some(row.blocks) {
                 summed = Some(row.blocks);
                 self.line(side, row.blocks, &mut line);
@@ -129,18 +131,60 @@ impl Cell {
         }
     }
 
-    /// [`line`](Self::line) where some texels block some pixels: those that `blocks` says of a column and a pixel's bit.
+    /// [`line`](Self::line) where some texels block some pixels: those that `is_before` says of a column and a place in the cell.
     #[cold]
-    fn line_of_some(&self, side: i32, row: Row, line: &mut [f32; 64], blocks: impl Fn(i32, usize) -> bool) {
+    fn line_of_some(
+        &self,
+        side: i32,
+        row: Row,
+        line: &mut [f32; 64],
+        is_before: impl Fn(i32, usize) -> bool,
+    ) {
         line[..self.count].fill(0.0);
-        for column in bits_of(row.blocks | row.if_behind) {
+        for column in bits_of(row.blocks | row.if_before) {
             let is_sure = row.blocks >> column & 1 == 1;
-            let pixels = self.bits[..self.count].iter().zip(&self.columns);
-            for (line, (&bit, &fraction)) in line.iter_mut().zip(pixels) {
-                if is_sure || blocks(column as i32, bit) {
+            let sums = line[..self.count].iter_mut().zip(&self.columns);
+            for (lane, (line, &fraction)) in sums.enumerate() {
+                if is_sure || is_before(column as i32, lane) {
                     *line += weight(side, column as i32, fraction);
                 }
             }
         }
+    }
+
+    /// The planes of the pixels.
+    #[cold]
+    fn planes(&self, maps: &FilterMaps<'_>, view: usize, pixels: &TilePixels<'_>) -> Vec<PixelPlane> {
+        let map = &maps.maps.maps[view];
+        let of = |&bit: &usize| {
+            let (gbuffer, pixel) = (pixels.gbuffer, pixels.pixel(bit));
+            let receiver = Receiver {
+                point: gbuffer.position[pixel],
+                normal: gbuffer.normal[pixel],
+                object: gbuffer.object[pixel],
+                tolerance: maps.maps.tolerance + view_tolerance(gbuffer.depth[pixel]),
+                pixel: pixels.at(bit),
+            };
+            let plane = TexelPlane::new(&map.view, map.map.width, &receiver);
+            PixelPlane { plane, tolerance: receiver.tolerance }
+        };
+        self.bits[..self.count].iter().map(of).collect()
+    }
+}
+
+/// The first two questions of one pixel: as [`Taps`](crate::taps::Taps) asks them.
+struct PixelPlane {
+    plane: TexelPlane,
+    tolerance: f32,
+}
+
+impl PixelPlane {
+    /// Whether what is stored in the texel `[column, row]`, where there is something, is before the pixel at `point`.
+    #[inline]
+    fn is_before(&self, maps: &FilterMaps<'_>, view: usize, [column, row]: [i32; 2], point: Vec3) -> bool {
+        let map = &maps.maps.maps[view].map;
+        let index = row as usize * map.width as usize + column as usize;
+        self.plane.rise(column as f32, row as f32, map.depth[index]) > 0.0
+            && maps.is_behind_texel(view, index, point, self.tolerance)
     }
 }

@@ -175,8 +175,8 @@ pub enum Outcome {
     AtMostOwn,
     /// To a filter, it shadows those at least: it is before each.
     AtLeastOwn,
-    /// To a filter, it shadows those of them that lie behind its plane.
-    IfBehind,
+    /// To a filter, it shadows those of them that it is before: it rises above their plane, and they lie behind its own.
+    IfBefore,
     /// Each has to ask.
     Unknown,
 }
@@ -313,7 +313,9 @@ impl Questions {
         if self.last.0 != triangle {
             self.last = (triangle, CasterPlane::new(scene.corners(triangle as usize), self.light));
         }
-        let Some(plane) = self.last.1 else { return Outcome::Unknown };
+        let Some(plane) = self.last.1 else {
+            return if form == Form::Ids { Outcome::IfBefore } else { Outcome::Unknown };
+        };
         // Question 2. A product with the plane's normal is made of that with the patch's own, which is the same for all
         // pixels but for rounding, and of what is left along the patch.
         let cos = plane.normal.dot(self.normal);
@@ -345,8 +347,7 @@ impl Questions {
         let is_risen = least - error > self.tolerance[1] + snapping;
         match form {
             Form::Hard if !(is_risen && is_behind) => return Outcome::Unknown,
-            Form::Ids if !is_risen => return Outcome::Unknown,
-            Form::Ids => return if is_behind { Outcome::Blocks } else { Outcome::IfBehind },
+            Form::Ids => return if is_risen && is_behind { Outcome::Blocks } else { Outcome::IfBefore },
             Form::Hard | Form::Filter => {}
         }
         // Question 3.
@@ -362,7 +363,7 @@ impl Questions {
             (true, true) if is_far => Outcome::Blocks,
             (true, true) if is_near => Outcome::AsOwn,
             (true, true) if form == Form::Filter => Outcome::AtLeastOwn,
-            (true, false) if is_far => Outcome::IfBehind,
+            _ if is_far => Outcome::IfBefore,
             _ if is_near => Outcome::AtMostOwn,
             _ => Outcome::Unknown,
         }

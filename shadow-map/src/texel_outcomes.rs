@@ -35,8 +35,8 @@ pub struct Row {
     pub at_most_own: u64,
     /// [`Outcome::AtLeastOwn`], and [`Outcome::AsOwn`].
     pub at_least_own: u64,
-    /// [`Outcome::IfBehind`].
-    pub if_behind: u64,
+    /// [`Outcome::IfBefore`].
+    pub if_before: u64,
     /// [`Outcome::Unknown`].
     pub unknown: u64,
 }
@@ -45,12 +45,12 @@ impl Row {
     /// Each word changed alike.
     #[inline]
     fn map(self, change: impl Fn(u64) -> u64) -> Self {
-        let Self { blocks, at_most_own, at_least_own, if_behind, unknown } = self;
+        let Self { blocks, at_most_own, at_least_own, if_before, unknown } = self;
         Self {
             blocks: change(blocks),
             at_most_own: change(at_most_own),
             at_least_own: change(at_least_own),
-            if_behind: change(if_behind),
+            if_before: change(if_before),
             unknown: change(unknown),
         }
     }
@@ -61,7 +61,7 @@ impl Row {
             blocks: self.blocks | other.blocks,
             at_most_own: self.at_most_own | other.at_most_own,
             at_least_own: self.at_least_own | other.at_least_own,
-            if_behind: self.if_behind | other.if_behind,
+            if_before: self.if_before | other.if_before,
             unknown: self.unknown | other.unknown,
         }
     }
@@ -70,19 +70,25 @@ impl Row {
     #[inline]
     #[must_use]
     pub fn told(self, own: Outcome) -> Self {
-        let Self { blocks, at_most_own, at_least_own, if_behind, unknown } = self;
-        let [blocks_too, untold] = match own {
-            Outcome::Blocks => [at_least_own, at_most_own & !at_least_own],
-            Outcome::Clear => [0, at_least_own & !at_most_own],
-            _ => [0, at_least_own | at_most_own],
+        let Self { blocks, at_most_own, at_least_own, if_before, unknown } = self;
+        let (at_most, at_least) = (at_most_own & !at_least_own, at_least_own & !at_most_own);
+        let [blocks_too, asked, untold] = match own {
+            Outcome::Blocks => [at_least_own, at_most, 0],
+            Outcome::Clear => [0, 0, at_least],
+            _ => [0, 0, at_least_own | at_most_own],
         };
-        Self { blocks: blocks | blocks_too, if_behind, unknown: unknown | untold, ..Self::default() }
+        Self {
+            blocks: blocks | blocks_too,
+            if_before: if_before | asked,
+            unknown: unknown | untold,
+            ..Self::default()
+        }
     }
 
     /// Those of which more is to be asked than the table knows.
     #[inline]
     pub fn open(&self) -> u64 {
-        self.at_most_own | self.at_least_own | self.if_behind | self.unknown
+        self.at_most_own | self.at_least_own | self.if_before | self.unknown
     }
 }
 
@@ -141,12 +147,13 @@ impl TexelOutcomes {
         for row in first[1]..=last[1] {
             let known = within.and_then(|within| within.run(first[0], row, columns as u32));
             let less_known =
-                |known: Row| known.if_behind | known.unknown | (known.at_most_own ^ known.at_least_own);
+                |known: Row| known.if_before | known.unknown | (known.at_most_own ^ known.at_least_own);
             let asked = known.map_or(whole, less_known);
             let mut bits = known.map_or(Row::default(), |known| known.map(|bits| bits & !asked));
             for bit in bits_of(asked) {
                 let column = first[0] + bit as i32;
-                let is_inside = (0..size as i32).contains(&column) && (0..size as i32).contains(&row);
+                // Beyond it nothing is held, nor read.
+                let is_inside = column >= 0 && row >= 0 && map.holds(column as usize, row as usize);
                 let index = if is_inside { row as usize * size + column as usize } else { 0 };
                 let depth = if is_inside { map.map.depth[index] } else { 0.0 };
                 let outcome = if depth <= 0.0 || form == Form::Ids && object_of(view, index) == patch.object {
@@ -169,7 +176,7 @@ impl TexelOutcomes {
                     }
                     Outcome::AtMostOwn => bits.at_most_own |= bit,
                     Outcome::AtLeastOwn => bits.at_least_own |= bit,
-                    Outcome::IfBehind => bits.if_behind |= bit,
+                    Outcome::IfBefore => bits.if_before |= bit,
                     Outcome::Unknown => bits.unknown |= bit,
                 }
             }
@@ -203,7 +210,7 @@ impl TexelOutcomes {
             Row { at_most_own: 1, at_least_own: 1, .. } => Outcome::AsOwn,
             Row { at_most_own: 1, .. } => Outcome::AtMostOwn,
             Row { at_least_own: 1, .. } => Outcome::AtLeastOwn,
-            Row { if_behind: 1, .. } => Outcome::IfBehind,
+            Row { if_before: 1, .. } => Outcome::IfBefore,
             Row { unknown: 1, .. } => Outcome::Unknown,
             _ => Outcome::Clear,
         }
