@@ -24,6 +24,7 @@
 //! Limits: leaks light where more than two surfaces lie over each other in a window; the blur is as many texels wide
 //! everywhere.
 
+use fearless_simd::{Level, dispatch};
 use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 use scene_core::{GBuffer, Report, VisibilityImage};
@@ -50,6 +51,36 @@ pub(crate) struct Moments<'a> {
     window: f32,
     four: bool,
     light_bleeding: f32,
+    level: Level,
+}
+
+/// Receivers that are answered side by side.
+const LANES: usize = 16;
+
+/// What some receivers read: the four windows around each of them, what each weighs, and the scaled depth that they are compared at.
+struct Reads {
+    windows: [[Window; LANES]; 4],
+    weights: [[f32; LANES]; 4],
+    depths: [f32; LANES],
+}
+
+impl Reads {
+    const NONE: Self =
+        Self { windows: [[Window::of(1.0); LANES]; 4], weights: [[0.25; LANES]; 4], depths: [-1.0; LANES] };
+
+    /// The bound of each. Alike for all lanes and without a branch, so that it becomes vector code.
+    #[inline(always)]
+    fn shadows(&self, bound: impl Fn(&Window, f32) -> f32) -> [f32; LANES] {
+        let mut shadows = [0.0; LANES];
+        for (lane, shadow) in shadows.iter_mut().enumerate() {
+            let parts = [0, 1, 2, 3].map(
+                #[inline(always)]
+                |part: usize| (self.weights[part][lane], self.windows[part][lane]),
+            );
+            *shadow = bound(&Window::joined_four(parts), self.depths[lane]);
+        }
+        shadows
+    }
 }
 
 /// The moments of one view's texels that are looked up, with a border of one for lookups between texels.
@@ -60,6 +91,7 @@ struct MomentMap {
     /// Column and row, counted from the border's, of the first that is kept.
     first: [usize; 2],
     columns: usize,
+    rows: usize,
     moments: Vec<Window>,
     depths: DepthScale,
 }
@@ -106,28 +138,74 @@ impl<'a> Moments<'a> {
             window: params.filter as f32,
             four: params.moments == 4,
             light_bleeding: params.light_bleeding,
+            level: Level::new(),
         }
     }
 
-    fn answer(&self, receiver: &Receiver) -> f32 {
+    /// What `receiver` reads; `None` if no map holds it, so that nothing shadows it.
+    #[inline(always)]
+    fn read(&self, receiver: &Receiver) -> Option<([(f32, Window); 4], f32)> {
         let views = self.maps.maps.iter().zip(&self.moments);
-        let found =
-            views.filter_map(|(map, moments)| Some((map, moments, map.view.project(receiver.point)?))).next();
-        let Some((map, moments, ndc)) = found else {
-            return 1.0;
-        };
+        let (map, moments, ndc) = views
+            .filter_map(|(map, moments)| Some((map, moments, map.view.project(receiver.point)?)))
+            .next()?;
         let size = map.map.width as f32;
         let at = Vec2::new(ndc.x * 0.5 + 0.5, 0.5 - ndc.y * 0.5) * size - 0.5;
         // Between texels the window reaches half a texel farther.
         let reach = 0.5 * (self.window + 1.0);
         let plane = TexelPlane::new(&map.view, map.map.width, receiver);
         let nearest = plane.nearest([at.x - reach, at.y - reach], [at.x + reach, at.y + reach]);
-        let depth = moments.depths.scaled(nearest.min(f32::MAX));
-        let window = moments.between_texels(at);
-        let shadow = if self.four { window.shadow_by_four(depth) } else { window.shadow_by_two(depth) };
+        Some((moments.between_texels(at), moments.depths.scaled(nearest.min(f32::MAX))))
+    }
+
+    /// V by the share of shadow.
+    #[inline(always)]
+    fn stretched(&self, shadow: f32) -> f32 {
         let stretched = (1.0 - shadow - self.light_bleeding) / (1.0 - self.light_bleeding);
         // What is not a number comes of a receiver that is not finite.
         stretched.clamp(0.0, 1.0)
+    }
+
+    fn answer(&self, receiver: &Receiver) -> f32 {
+        let Some((parts, depth)) = self.read(receiver) else { return 1.0 };
+        let window = Window::joined_four(parts);
+        self.stretched(if self.four { window.shadow_by_four(depth) } else { window.shadow_by_two(depth) })
+    }
+
+    /// V of a run of pixels, from `first` on.
+    #[inline(always)]
+    fn shade_run(&self, gbuffer: &GBuffer, first: usize, values: &mut [f32]) {
+        for (run, values) in values.chunks_mut(LANES).enumerate() {
+            let (mut reads, mut asked) = (Reads::NONE, [false; LANES]);
+            for (lane, value) in values.iter_mut().enumerate() {
+                *value = match cpu::receiver(&self.maps, gbuffer, first + run * LANES + lane) {
+                    Err(known) => known,
+                    Ok(receiver) => {
+                        if let Some((parts, depth)) = self.read(&receiver) {
+                            asked[lane] = true;
+                            reads.depths[lane] = depth;
+                            for (part, (weight, window)) in parts.into_iter().enumerate() {
+                                (reads.weights[part][lane], reads.windows[part][lane]) = (weight, window);
+                            }
+                        }
+                        1.0
+                    }
+                };
+            }
+            let shadows = if self.four {
+                reads.shadows(
+                    #[inline(always)]
+                    |window, depth| window.shadow_by_four(depth),
+                )
+            } else {
+                reads.shadows(
+                    #[inline(always)]
+                    |window, depth| window.shadow_by_two(depth),
+                )
+            };
+            let found = values.iter_mut().zip(asked).zip(shadows).filter(|((_, asked), _)| *asked);
+            found.for_each(|((value, _), shadow)| *value = self.stretched(shadow));
+        }
     }
 }
 
@@ -171,32 +249,31 @@ impl MomentMap {
                 *joined = Window::joined((0..=2 * half).map(|step| (weight(step) * share, window(step))));
             }
         });
-        Self { side: map.map.width as usize + 2, first, columns, moments, depths }
+        Self { side: map.map.width as usize + 2, first, columns, rows, moments, depths }
     }
 
-    /// Moments at a place in texels, 0 at the centre of the first, linear between centres.
-    #[inline]
-    fn between_texels(&self, at: Vec2) -> Window {
+    /// The four windows around a place in texels, 0 at the centre of the first, and what they weigh there: linear between centres.
+    #[inline(always)]
+    fn between_texels(&self, at: Vec2) -> [(f32, Window); 4] {
         let at = (at + 1.0).clamp(Vec2::ZERO, Vec2::splat(self.side as f32 - 1.0));
         let first = at.floor().min(Vec2::splat(self.side as f32 - 2.0));
         let b = at - first;
         let a = 1.0 - b;
-        let [column, row] = [first.x as usize, first.y as usize];
         // Who is not seen may ask for what is not kept.
+        let column = (first.x as usize).wrapping_sub(self.first[0]);
+        let row = (first.y as usize).wrapping_sub(self.first[1]);
         let window = |column: usize, row: usize| {
-            let [column, row] = [column.wrapping_sub(self.first[0]), row.wrapping_sub(self.first[1])];
-            let line = self.moments.chunks(self.columns.max(1)).nth(row);
-            line.and_then(|line| line.get(column)).copied().unwrap_or(Window::of(1.0))
+            let index = row.wrapping_mul(self.columns).wrapping_add(column);
+            let is_kept = column < self.columns && row < self.rows;
+            if is_kept { self.moments[index] } else { Window::of(1.0) }
         };
-        Window::joined(
-            [
-                (a.x * a.y, window(column, row)),
-                (b.x * a.y, window(column + 1, row)),
-                (a.x * b.y, window(column, row + 1)),
-                (b.x * b.y, window(column + 1, row + 1)),
-            ]
-            .into_iter(),
-        )
+        let [right, below] = [column, row].map(|at| at.wrapping_add(1));
+        [
+            (a.x * a.y, window(column, row)),
+            (b.x * a.y, window(right, row)),
+            (a.x * b.y, window(column, below)),
+            (b.x * b.y, window(right, below)),
+        ]
     }
 }
 
@@ -212,8 +289,8 @@ struct Window {
 impl Window {
     /// One depth.
     #[inline]
-    fn of(mean: f32) -> Self {
-        Self { mean, ..Self::default() }
+    const fn of(mean: f32) -> Self {
+        Self { mean, second: 0.0, third: 0.0, fourth: 0.0 }
     }
 
     /// Windows together, by weights whose sum is 1.
@@ -230,7 +307,27 @@ impl Window {
         Self { mean, second: sums.y, third: sums.z, fourth: sums.w }
     }
 
+    /// [`joined`](Self::joined) of four, in the same order.
+    #[inline(always)]
+    fn joined_four(parts: [(f32, Self); 4]) -> Self {
+        let [a, b, c, d] = parts.map(
+            #[inline(always)]
+            |(weight, part)| weight * part.mean,
+        );
+        let mean = a + b + c + d;
+        let mut sums = Self { mean, ..Self::default() };
+        for (weight, part) in parts {
+            let d = part.mean - mean;
+            let square = d * d;
+            sums.second += weight * (part.second + square);
+            sums.third += weight * (part.third + d * (3.0 * part.second + square));
+            sums.fourth += weight * (part.fourth + d * (4.0 * part.third + d * (6.0 * part.second + square)));
+        }
+        sums
+    }
+
     /// The least shadow at `depth` of any distribution with this mean and spread: Chebyshev's inequality.
+    #[inline(always)]
     fn shadow_by_two(&self, depth: f32) -> f32 {
         let above = (depth - 2.0 * LEAST_SPREAD - self.mean).max(0.0);
         above * above / (self.second + LEAST_SPREAD * LEAST_SPREAD + above * above)
@@ -241,6 +338,7 @@ impl Window {
     ///
     /// With x the depth, s and k the third and fourth moment in units of the spread the matrix is (1 0 1; 0 1 s; 1 s k), its
     /// last pivot d = k − 1 − s², and the polynomial times d has the coefficients that are taken here.
+    #[inline(always)]
     fn shadow_by_four(&self, depth: f32) -> f32 {
         let variance = self.second + LEAST_SPREAD * LEAST_SPREAD;
         let spread = variance.sqrt();
@@ -286,7 +384,10 @@ fn depth_at(maps: &LightMaps<'_>, view: usize, depths: DepthScale, column: i32, 
 impl PreparedVariant for Moments<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage, report: &mut Report) {
         report.time("shade.lookup", |_| {
-            cpu::shade_pixels(&self.maps, gbuffer, visibility, |receiver| self.answer(receiver));
+            let width = gbuffer.width.max(1) as usize;
+            visibility.values.par_chunks_mut(width).enumerate().for_each(|(row, values)| {
+                dispatch!(self.level, _simd => self.shade_run(gbuffer, row * width, values));
+            });
         });
     }
 

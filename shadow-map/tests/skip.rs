@@ -2,7 +2,7 @@
 
 mod views;
 
-use gnomon_shadow_map::{ShadowMap, ShadowMapParams, Variant};
+use gnomon_shadow_map::{Kernel, ShadowMap, ShadowMapParams, Variant};
 use scene_core::relevance::CasterChunks;
 use scene_core::{Light, Scene, VisibilityImage, raster, scenes};
 use views::random_view;
@@ -106,4 +106,50 @@ fn faces_that_nobody_sees_are_not_drawn() {
     let params = ShadowMapParams { variant: Variant::Pcss, taps: 16, ..Default::default() };
     let (culled, dark) = compare(&setup.scene, &lamp, params, 24);
     assert!(culled > 0 && dark > 0, "{culled} left out, {dark} dark pixels");
+}
+
+/// Texels much larger than pixels, so that tiles ask about the same ones: any width of a filter, also under a lamp from all sides.
+#[test]
+fn coarse_maps_are_looked_up_together() {
+    let (mut known, mut shaded) = ([0; 3], 0);
+    for spec in ["forest:triangles=20000", "street", "layers", "edges", "chess", "log-cabin", "knot"] {
+        let setup = scenes::build(spec, 0.0).expect("a built-in scene");
+        let (scene, bounds) = (&setup.scene, setup.scene.bounds());
+        let lamp = Light::Point { position: bounds.center() + 0.2 * bounds.size() };
+        let views = (0..5).map(|seed| random_view(scene, seed)).chain([setup.camera.with_size(90, 70)]);
+        let gbuffers: Vec<_> = views.map(|camera| raster::render_gbuffer(scene, &camera)).collect();
+        for (light, filter) in [(setup.lights[0], 5), (setup.lights[0], 2), (lamp, 3), (lamp, 1)] {
+            let cases = [
+                (Variant::Hard, Kernel::Grid),
+                (Variant::Pcf, Kernel::Grid),
+                (Variant::Pcf, Kernel::PoissonDisk),
+                (Variant::ObjectId, Kernel::Grid),
+                (Variant::Moments, Kernel::Grid),
+            ];
+            for (variant, kernel) in cases {
+                let params =
+                    ShadowMapParams { variant, kernel, filter, map_size: 48, taps: 12, ..Default::default() };
+                let without = ShadowMapParams { skip: false, ..params };
+                let [(on, _), (off, _)] =
+                    [params, without].map(|params| ShadowMap::new(params).prepare(scene, &light));
+                for gbuffer in &gbuffers {
+                    let mut images = [(); 2].map(|()| VisibilityImage::new(gbuffer.width, gbuffer.height));
+                    let report = on.shade(gbuffer, &mut images[0]);
+                    off.shade(gbuffer, &mut images[1]);
+                    let [a, b] = images.map(|i| i.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+                    let wrong = a.iter().zip(&b).filter(|(a, b)| a != b).count();
+                    assert_eq!(wrong, 0, "{spec}, {light:?}, {params:?}");
+                    let skipped = |what| report.skipped.get(what).copied().unwrap_or(0);
+                    match variant {
+                        Variant::Hard => known[0] += skipped("lookups"),
+                        Variant::Pcf => known[1] += skipped("filters"),
+                        _ => known[2] += skipped("filters"),
+                    }
+                    shaded += gbuffer.pixel_count() as u64;
+                }
+            }
+        }
+    }
+    println!("{known:?} of {shaded} pixels known from tables");
+    assert!(known.iter().all(|&known| known * 40 > shaded), "{known:?} of {shaded}");
 }
