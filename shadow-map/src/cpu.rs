@@ -100,8 +100,8 @@ pub fn shade_pixels(
     });
 }
 
-/// What a pixel sees, or its V where no lookup is needed.
-#[inline]
+/// What a pixel sees, or its V where no lookup is needed. A call would cost as much as what it does.
+#[inline(always)]
 pub fn receiver(maps: &LightMaps<'_>, gbuffer: &GBuffer, pixel: usize) -> Result<Receiver, f32> {
     if !gbuffer.is_seen(pixel) {
         return Err(f32::NAN);

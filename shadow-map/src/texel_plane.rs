@@ -31,6 +31,7 @@ pub struct TexelPlane {
 
 impl TexelPlane {
     /// The plane of `receiver` in a map of `size` texels a side, drawn through `view`.
+    #[inline]
     pub fn new(view: &LightView, size: u32, receiver: &Receiver) -> Self {
         let Receiver { point, normal, tolerance, .. } = *receiver;
         let texel = 2.0 / size as f32;
