@@ -27,7 +27,7 @@ fn stages(c: &mut Criterion) {
                     light,
                     camera,
                     &gbuffer,
-                    scene.bounds(),
+                    &[scene.bounds()],
                     &params,
                     &mut Report::default(),
                 )

@@ -49,7 +49,7 @@ fn along(a: DVec3, b: DVec3, [t1, t2]: [DVec3; 2]) -> DMat2 {
 }
 
 /// How a point moves on the surface with its place in the map: the inverse of `J_m`.
-fn surface_from_place(warp: &Warp, point: DVec3, surface: [DVec3; 2]) -> DMat2 {
+pub(crate) fn surface_from_place(warp: &Warp, point: DVec3, surface: [DVec3; 2]) -> DMat2 {
     let w = at(warp.w, point);
     let place = warp.place(point);
     let u = (warp.x - warp.w * place.x).truncate() / w;

@@ -8,7 +8,7 @@ use crate::light_image::LightImage;
 use crate::seen::Sample;
 use crate::view_frame::ViewFrame;
 use crate::warp::{Warp, Window};
-use crate::{lispsm, post_perspective, virtual_camera};
+use crate::{fitted, lispsm, post_perspective, virtual_camera};
 
 /// How the texels of a map are spread.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +22,8 @@ pub enum Parametrisation {
     },
     /// By a perspective in the light's own image.
     Lispsm,
+    /// By the homography of the light's own image that promises the least error.
+    Fitted,
 }
 
 /// A parametrisation and what it would give.
@@ -81,21 +83,33 @@ impl Situation<'_> {
             Variant::Psm => vec![psm(self.papers_shift).unwrap_or_else(uniform)],
             Variant::Lispsm => vec![lispsm()],
             Variant::Auto => {
-                let mut warps = vec![uniform(), lispsm()];
-                let (least, papers) = (psm(0.0), psm(self.papers_shift));
-                warps.extend(least);
-                warps.extend(papers.filter(|_| papers != least));
-                warps
+                let warp = fitted::least(
+                    &self.image.warp,
+                    &self.window(&self.image.warp),
+                    &self.spread(),
+                    self.near_shadows,
+                );
+                let fitted = warp.map(|warp| (Parametrisation::Fitted, warp));
+                std::iter::once(uniform()).chain(fitted).collect()
             }
         };
         warps.into_iter().map(|(parametrisation, warp)| self.measured(parametrisation, warp)).collect()
     }
 
+    /// All receivers that are known by place.
+    fn spread(&self) -> Vec<DVec3> {
+        self.samples.iter().map(|s| s.point).chain(self.receivers.iter().copied()).collect()
+    }
+
+    /// Their window.
+    fn window(&self, warp: &Warp) -> Window {
+        let points = self.spread();
+        points.iter().fold(Window::EMPTY, |window, &point| window.with(warp.place(point))).widened()
+    }
+
     /// A warp, measured in the window that these receivers would give it.
     fn measured(&self, parametrisation: Parametrisation, warp: Warp) -> Candidate {
-        let points = self.samples.iter().map(|s| s.point).chain(self.receivers.iter().copied());
-        let window = points.fold(Window::EMPTY, |window, point| window.with(warp.place(point)));
-        let window = window.widened();
+        let window = self.window(&warp);
         let error = |s: &Sample| aliasing::expected_error(&warp, &window, self.map_size, s.point, s.normal);
         Candidate::new(parametrisation, warp, self.near_shadows.iter().map(error).collect())
     }

@@ -2,8 +2,10 @@
 
 pub mod aliasing;
 pub mod caster_boxes;
+pub mod caster_image;
 pub mod choice;
 pub mod cpu;
+pub mod fitted;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod light_image;
@@ -23,7 +25,6 @@ use glam::Vec3;
 use gnomon_shadow_map::cpu::answer_points;
 use gnomon_shadow_map::light_maps::LightMaps;
 use gnomon_shadow_map::receiver_plane::plane_tolerance;
-use scene_core::geometry::Aabb;
 use scene_core::{Camera, GBuffer, Light, Origin, Report, Scene, VisibilityImage, relevance};
 
 pub use choice::Parametrisation;
@@ -101,10 +102,10 @@ impl Psm {
         let own = (!origin.is_world()).then(|| PointClouds::new(&scene));
         let clouds = own.as_ref().unwrap_or(clouds);
         let tolerance = plane_tolerance(scene.bounds(), &light);
-        let casters = relevance::told_apart(&scene, &light, tolerance);
+        let casters = relevance::told_apart_with_solids(&scene, &light, tolerance);
         report.skip("casters", casters.backdrops.len() as u64);
-        let bounds = casters.drawn.iter().fold(Aabb::EMPTY, |sum, object| sum.union(object.bounds));
-        let views = views::map_views(&scene, &light, &camera, &gbuffer, bounds, &params, &mut report);
+        let boxes: Vec<_> = casters.drawn.iter().map(|object| object.bounds).collect();
+        let views = views::map_views(&scene, &light, &camera, &gbuffer, &boxes, &params, &mut report);
         let maps = report.time("prepare.maps", |report| {
             cpu::render_maps(&scene, &casters, clouds, views, &params, report)
         });

@@ -11,6 +11,7 @@ use scene_core::camera::CameraRays;
 use scene_core::light::LightPoint;
 use scene_core::{Camera, GBuffer, Light, Scene};
 
+use crate::caster_image::Within;
 use crate::light_image::FACES;
 use crate::warp::{Warp, Window, at};
 
@@ -34,6 +35,8 @@ pub struct Sample {
     pub point: DVec3,
     /// Unit normal, world space.
     pub normal: DVec3,
+    /// Column and row of its tile.
+    pub tile: [u32; 2],
 }
 
 /// The receivers of one tile that lie in one image of the light. Pixels are [`GBuffer::NOTHING`] where there is none.
@@ -230,8 +233,9 @@ impl<'a> Seen<'a> {
             seen.depths = [seen.depths[0].min(depth[near]), seen.depths[1].max(depth[far])];
             seen.ends.extend([near, far].map(|pixel| position[pixel].as_dvec3()));
         }
-        let samples = seen.tiles.iter().filter(|tile| tile.sample != GBuffer::NOTHING);
-        seen.samples.extend(samples.map(|tile| Sample {
+        let samples = seen.tiles.iter().enumerate().filter(|(_, tile)| tile.sample != GBuffer::NOTHING);
+        seen.samples.extend(samples.map(|(index, tile)| Sample {
+            tile: [(index % columns) as u32, (index / columns) as u32],
             point: position[tile.sample as usize].as_dvec3(),
             normal: normal[tile.sample as usize].as_dvec3(),
         }));
@@ -245,17 +249,25 @@ impl<'a> Seen<'a> {
         self.ends.is_empty()
     }
 
-    /// The window of `warp` around all receivers, and the range of w over them. `is_of` takes those of this image.
+    /// The window of `warp` around all receivers that lie `within` a part of the light's image, and the range of w over them. `is_of`
+    /// takes those of this image.
     ///
     /// The ends give most of it; a tile is asked pixel by pixel only if the part of the view that holds its receivers
     /// reaches beyond.
-    pub fn fit(&self, warp: &Warp, is_of: impl Fn(Vec3) -> bool + Sync) -> (Window, [f64; 2]) {
+    pub fn fit(
+        &self,
+        warp: &Warp,
+        within: Within<'_>,
+        is_of: impl Fn(Vec3) -> bool + Sync,
+    ) -> (Window, [f64; 2]) {
+        let Within { image, part } = within;
+        let holds = |point: DVec3| part.is_everywhere() || part.holds(image.place(point));
         let with = |(window, [low, high]): (Window, [f64; 2]), point: DVec3| {
             let w = at(warp.w, point);
             (window.with(warp.place(point)), [low.min(w), high.max(w)])
         };
         let nothing = (Window::EMPTY, [f64::INFINITY, f64::NEG_INFINITY]);
-        let first = self.ends.iter().copied().fold(nothing, with);
+        let first = self.ends.iter().copied().filter(|&p| holds(p)).fold(nothing, with);
         let position = &self.wanted.gbuffer.position;
         let columns = self.grid.columns as usize;
         let asked = self.tiles.par_iter().enumerate().filter_map(|(index, tile)| {
@@ -263,14 +275,22 @@ impl<'a> Seen<'a> {
                 return None;
             }
             let place = [index % columns, index / columns];
-            let around = self.corners(place, tile).into_iter().fold(nothing, with);
+            let corners = self.corners(place, tile);
+            if corners.iter().all(|&p| at(image.w, p) > 0.0)
+                && part.is_beside(&corners.map(|p| image.place(p)))
+            {
+                return None;
+            }
+            let around = corners.into_iter().fold(nothing, with);
             let is_inside = around.1[0] > 0.0
                 && first.0.union(around.0) == first.0
                 && around.1[0] >= first.1[0]
                 && around.1[1] <= first.1[1];
             let pixels = self.wanted.pixels(self.grid, place).map(|(_, _, pixel)| pixel);
             let points = pixels.filter(|&pixel| self.wanted.at(pixel).is_some()).map(|pixel| position[pixel]);
-            (!is_inside).then(|| points.filter(|&p| is_of(p)).map(Vec3::as_dvec3).fold(nothing, with))
+            (!is_inside).then(|| {
+                points.filter(|&p| is_of(p)).map(Vec3::as_dvec3).filter(|&p| holds(p)).fold(nothing, with)
+            })
         });
         asked.reduce(
             || first,

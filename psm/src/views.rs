@@ -7,12 +7,13 @@ use scene_core::relevance::{CasterRegion, HalfSpace, Polyhedron, Receivers};
 use scene_core::{Camera, GBuffer, Light, Report, Scene};
 
 use crate::aliasing::{self, Aliasing};
+use crate::caster_image::{CasterImage, Within};
 use crate::choice::{Parametrisation, Situation, choose};
 use crate::light_image::{FACES, LightImage, face_of, face_volume};
 use crate::seen::{Sample, Seen, Wanted};
 use crate::view_frame::ViewFrame;
 use crate::warp::{self, Warp, Window};
-use crate::{PsmParams, caster_boxes, virtual_camera};
+use crate::{PsmParams, Variant, caster_boxes, virtual_camera};
 
 /// A map's projection.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,11 +55,13 @@ pub struct Images {
     pub casters: Aabb,
     /// Bounds of each object that casts.
     pub boxes: Vec<Aabb>,
+    /// For each image, the part of it that they fill.
+    pub filled: Vec<CasterImage>,
 }
 
 impl Images {
-    /// For what `camera` may see. `casters` are the bounds of all that casts.
-    pub fn new(scene: &Scene, light: &Light, camera: &Camera, casters: Aabb) -> Self {
+    /// For what `camera` may see, with the bounds of each object that casts.
+    pub fn new(scene: &Scene, light: &Light, camera: &Camera, boxes: Vec<Aabb>) -> Self {
         let receivers = Receivers::seen_by(scene, camera, light);
         let corners: Vec<_> = receivers.region().vertices().collect();
         let frame = ViewFrame::new(camera);
@@ -80,9 +83,9 @@ impl Images {
                 })
                 .unzip(),
         };
-        let objects = scene.objects().iter().filter(|object| object.flags.casts);
-        let boxes = objects.map(|object| object.bounds).collect();
-        Self { images, papers_shift, casters, boxes }
+        let casters = boxes.iter().fold(Aabb::EMPTY, |sum, &bounds| sum.union(bounds));
+        let filled = images.iter().map(|image| CasterImage::new(image, &boxes)).collect();
+        Self { images, papers_shift, casters, boxes, filled }
     }
 
     /// Which image a receiver lies in.
@@ -95,21 +98,21 @@ impl Images {
     }
 }
 
-/// `prepare.receivers` and `prepare.views`: the maps that what `camera` sees in `gbuffer` needs, with `casters` the bounds of
-/// all that casts. One at most for each of the light's [`Images`]; an image without a receiver gets none.
+/// `prepare.receivers` and `prepare.views`: the maps that what `camera` sees in `gbuffer` needs, with the bounds of each
+/// object that casts. One at most for each of the light's [`Images`]; an image without a receiver gets none.
 pub fn map_views(
     scene: &Scene,
     light: &Light,
     camera: &Camera,
     gbuffer: &GBuffer,
-    casters: Aabb,
+    boxes: &[Aabb],
     params: &PsmParams,
     report: &mut Report,
 ) -> Vec<MapView> {
-    if casters.is_empty() {
+    if boxes.iter().all(Aabb::is_empty) {
         return Vec::new();
     }
-    let images = report.time("prepare.images", |_| Images::new(scene, light, camera, casters));
+    let images = report.time("prepare.images", |_| Images::new(scene, light, camera, boxes.to_vec()));
     let wanted = Wanted::new(scene, gbuffer, camera, light);
     let seen = report
         .time("prepare.receivers", |_| wanted.seen(images.images.len(), |point| images.image_of(point)));
@@ -131,24 +134,39 @@ fn map_view(
     let image = images.images[index];
     // The light itself has no place in its image, and what is so near to it has none that f32 can tell.
     let largest = seen.ends.iter().map(|&p| image.w(p)).fold(0.0, f64::max);
-    let receivers: Vec<_> =
+    let mut receivers: Vec<_> =
         seen.ends.iter().copied().filter(|&p| image.w(p) > largest / 1_048_576.0).collect();
     if receivers.is_empty() {
         return None;
     }
-    let near_shadows = caster_boxes::near_shadows(&images.boxes, image.light, &seen.samples);
+    // The paper's maps hold all receivers; the one that is fitted, those which something may shadow. Where no sample is among them
+    // nothing is known of how they lie.
+    let filled = if params.variant == Variant::Auto { images.filled[index] } else { CasterImage::EVERYWHERE };
+    let within = |part: &CasterImage| -> Vec<Sample> {
+        seen.samples.iter().copied().filter(|s| part.holds(image.warp.place(s.point))).collect()
+    };
+    let mut samples = within(&filled);
+    let near_shadows = caster_boxes::near_shadows(&images.boxes, image.light, &samples);
+    let part = if near_shadows.is_empty() { CasterImage::EVERYWHERE } else { filled };
+    if near_shadows.is_empty() {
+        samples = within(&part);
+    }
+    receivers.retain(|&point| part.holds(image.warp.place(point)));
     let situation = Situation {
         image,
         frame,
         depths: seen.depths.map(f64::from),
         receivers,
         papers_shift: images.papers_shift[index],
-        samples: &seen.samples,
+        samples: &samples,
         near_shadows: &near_shadows,
         map_size: params.map_size,
     };
     let chosen = choose(situation.candidates(params.variant))?;
-    let fit = |warp: &Warp| seen.fit(warp, |point| images.image_of(point) == index);
+    let fit = |warp: &Warp| {
+        let within = Within { image: &image.warp, part: &part };
+        seen.fit(warp, within, |point| images.image_of(point) == index)
+    };
     let (mut parametrisation, mut warp) = (chosen.parametrisation, chosen.warp);
     let (mut window, mut w) = fit(&warp);
     let is_before = w[0] > 0.0;
@@ -165,7 +183,7 @@ fn map_view(
     let rounding =
         [offsets.x.w, offsets.y.w, offsets.w.w].map(f64::abs).into_iter().fold(0.0, f64::max) / w[0];
     let window = window.widened().grown(rounding * f64::from(f32::EPSILON));
-    let values = aliasing::of_samples(&warp, &window, params.map_size, frame, &seen.samples);
+    let values = aliasing::of_samples(&warp, &window, params.map_size, frame, &samples);
     let error = |s: &Sample| aliasing::expected_error(&warp, &window, params.map_size, s.point, s.normal);
     let measure = near_shadows.iter().map(error).sum::<f64>() / near_shadows.len().max(1) as f64;
     let clip_from_world = warp::clip_from_world(&window.fitted(&warp), image.light, w, images.casters);

@@ -17,7 +17,7 @@ use scene_core::relevance::HalfSpace;
 
 /// How far a window reaches beyond the receivers it is fitted to, as a share of its extent: rounding of the f32
 /// matrix must not push one over the border (2⁻¹⁶ is 256 ulps).
-const MARGIN: f64 = 1.0 / 65_536.0;
+pub(crate) const MARGIN: f64 = 1.0 / 65_536.0;
 
 /// The nearest caster a point light's map holds, as a share of its receiver's distance: reversed floating-point
 /// depth keeps its relative precision, so this may be as small as positions are exact (2⁻²⁰).

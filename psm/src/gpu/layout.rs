@@ -1,10 +1,10 @@
 //! What shaders read and write, as they lay it out. A test holds every offset against the linked WGSL.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, Vec3, Vec4};
+use glam::{DVec2, DVec3, Vec3, Vec4};
 use scene_core::light::LightPoint;
 
-use crate::light_image::LightImage;
+use crate::caster_image::{DIRECTIONS, direction};
 use crate::params::{Show, Variant};
 use crate::seen::TileGrid;
 use crate::view_frame::ViewFrame;
@@ -50,6 +50,9 @@ impl FrameUniform {
     }
 }
 
+/// Beyond every place: `FAR` of `warp.wesl`.
+const FAR: f32 = 3.0e38;
+
 /// `LightImage` of `frame.wesl`: forms on positions relative to the eye.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -70,21 +73,18 @@ pub struct ImageUniform {
     pub papers_shift: f32,
     /// Sine of the angle between the image's axis and the view direction.
     pub sine: f32,
+    /// Supports of the part of the image that casters fill, places of parallel light relative to the eye's.
+    pub filled: [Vec4; DIRECTIONS / 4],
 }
 
 impl ImageUniform {
     /// Of each image.
     pub fn all(images: &Images, frame: &ViewFrame) -> Vec<Self> {
-        let shifts = images.papers_shift.iter();
-        images
-            .images
-            .iter()
-            .zip(shifts)
-            .map(|(image, &shift)| Self::new(image, images, frame, shift))
-            .collect()
+        (0..images.images.len()).map(|index| Self::new(images, index, frame)).collect()
     }
 
-    fn new(image: &LightImage, images: &Images, frame: &ViewFrame, papers_shift: f64) -> Self {
+    fn new(images: &Images, index: usize, frame: &ViewFrame) -> Self {
+        let (image, papers_shift) = (&images.images[index], images.papers_shift[index]);
         let form = |axis: DVec3, from: DVec3| axis.extend(axis.dot(from)).as_vec4();
         let (axes, zero) = (image.axes, DVec3::ZERO);
         let (from, w, light, [low, range]) = match image.light {
@@ -99,6 +99,16 @@ impl ImageUniform {
                 (zero, Vec4::W, towards.extend(0.0), [low - towards.dot(frame.eye), range])
             }
         };
+        // Only parallel light's places know an origin.
+        let origin = match image.light {
+            LightPoint::At(_) => DVec2::ZERO,
+            LightPoint::Towards(_) => image.warp.place(frame.eye),
+        };
+        let filled: [f32; DIRECTIONS] = std::array::from_fn(|i| {
+            let support = images.filled[index].supports[i] - direction(i).dot(origin);
+            // Shaders know no infinity.
+            (support as f32).clamp(-FAR, FAR)
+        });
         Self {
             x: form(axes.x_axis, from),
             y: form(axes.y_axis, from),
@@ -108,6 +118,7 @@ impl ImageUniform {
             along_range: range as f32,
             papers_shift: papers_shift as f32,
             sine: axes.z_axis.cross(frame.forward).length() as f32,
+            filled: bytemuck::cast(filled),
         }
     }
 }
@@ -136,7 +147,7 @@ impl BoxOnGpu {
 pub struct ViewOnGpu {
     /// x, y and w of normalised device coordinates, as forms on positions relative to the eye.
     pub ndc: [Vec4; 3],
-    /// 1 to 3, in the order of [`Variant::ALL`]; 0 for no map.
+    /// 1 to 3, in the order of [`Variant::ALL`]; 4 for what `auto` fits; 0 for no map.
     pub parametrisation: u32,
     /// Of the virtual camera, for [`Parametrisation::Psm`].
     pub shift: f32,
@@ -153,6 +164,7 @@ impl ViewOnGpu {
             1 => Some(Parametrisation::Psm { shift: f64::from(self.shift) }),
             2 => Some(Parametrisation::Lispsm),
             3 => Some(Parametrisation::Uniform),
+            4 => Some(Parametrisation::Fitted),
             _ => None,
         }
     }
@@ -190,7 +202,7 @@ mod tests {
             ImageUniform,
             CHOICE,
             "LightImage",
-            [x, y, w, light, along_low, along_range, papers_shift, sine]
+            [x, y, w, light, along_low, along_range, papers_shift, sine, filled]
         );
         assert_layout!(BoxOnGpu, CHOICE, "CasterBox", [low, high]);
         assert_layout!(ViewOnGpu, VIEWS, "View", [ndc, parametrisation, shift, measure]);

@@ -25,7 +25,6 @@ pub mod shaders;
 use std::ops::Range;
 
 use gnomon_shadow_map::receiver_plane::plane_tolerance;
-use scene_core::geometry::Aabb;
 use scene_core::gpu::{
     Bound, ComputePass, DepthIds, DepthLayers, DepthPass, DepthTarget, GpuError, GpuGBuffer, GpuShadowQuery,
     HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings, SceneGroups, SceneHandles, VisibilityPass,
@@ -180,9 +179,13 @@ impl PsmOnGpu {
         let geometry = query.scene.geometry_or_boxes();
         let tolerance = plane_tolerance(geometry.bounds(), query.light);
         let (casters, images) = report.time("prepare.images", |_| {
-            let casters = relevance::told_apart(&geometry, query.light, tolerance);
-            let bounds = casters.drawn.iter().fold(Aabb::EMPTY, |sum, object| sum.union(object.bounds));
-            (casters, Images::new(&geometry, query.light, query.camera, bounds))
+            // Boxes in the place of geometry are no solids.
+            let has_solids = query.scene.geometry.is_some();
+            let told_apart =
+                if has_solids { relevance::told_apart_with_solids } else { relevance::told_apart };
+            let casters = told_apart(&geometry, query.light, tolerance);
+            let boxes = casters.drawn.iter().map(|object| object.bounds).collect();
+            (casters, Images::new(&geometry, query.light, query.camera, boxes))
         });
         report.skip("casters", casters.backdrops.len() as u64);
         let is_drawn = |id: usize| {
