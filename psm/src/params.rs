@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Variant {
-    /// Whichever of the others promises the least error in this frame, by what is measured of its aliasing.
+    /// By the homography that promises the least error in this frame, over what casters may shadow; evenly unless that gains enough.
     #[default]
     Auto,
     /// Perspective shadow maps with the paper's virtual camera. Stamminger and Drettakis 2002.

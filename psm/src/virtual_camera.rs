@@ -4,7 +4,7 @@
 //! extended. The farther, the weaker the foreshortening; at infinity the cube is the world, and the map uniform.
 //!
 //! This crate's maps stay valid with casters behind the viewer (see [`crate::warp`]), so the shift is a choice, not a
-//! need: the variant `psm` makes it as the paper does, `auto` tries it with and without. What *is* needed is that
+//! need, and the variant `psm` makes it as the paper does. What *is* needed is that
 //! the light sees the receivers' cube within 60°: [`least`] finds the smallest shift that makes it so.
 
 use crate::warp::Warp;
