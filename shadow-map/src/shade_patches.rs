@@ -194,30 +194,31 @@ impl<L: PatchLookup> RowOfTiles<'_, L> {
 
     /// False where the patch's pixels have to be asked alone.
     fn shade_patch(&mut self, patch: &Patch, x: usize, whole: u64) -> bool {
-        let (width, lookup) = (self.gbuffer.width.max(1) as usize, self.lookup);
+        let lookup = self.lookup;
+        let constant = |table: &TexelOutcomes| table.all().and_then(|outcome| lookup.constant(outcome));
+        let table = self.surfaces.table_of(patch);
+        if let Some(v) = table.and_then(constant) {
+            self.fill(patch, x, whole, v);
+            return true;
+        }
         let Some(mut questions) = Questions::new(patch, &self.maps.light, self.maps.tolerance) else {
             return false;
         };
         let reach = lookup.reach();
         let most = patch.mask.count_ones() as usize * (reach[0] + reach[1] + 1.0).powi(2) as usize;
-        let reads = Reads { form: L::FORM, reach, most, within: self.surfaces.table_of(patch) };
+        let reads = Reads { form: L::FORM, reach, most, within: table };
         let object_of = |view, index| lookup.object_of(view, index);
         if !self.outcomes.fill(self.maps, patch, &mut questions, reads, object_of) {
             return false;
         }
-        if let Some(v) = self.outcomes.all().and_then(|outcome| lookup.constant(outcome)) {
-            self.counts[1] += u64::from(patch.mask.count_ones());
-            if patch.mask == whole {
-                let columns = TILE.min(width - x);
-                self.values.chunks_mut(width).for_each(|line| line[x..x + columns].fill(v));
-            } else {
-                bits_of(patch.mask).for_each(|bit| self.values[bit / TILE * width + x + bit % TILE] = v);
-            }
+        if let Some(v) = constant(&self.outcomes) {
+            self.fill(patch, x, whole, v);
             return true;
         }
         let mut values = [0.0; 64];
         let pixels = TilePixels { gbuffer: self.gbuffer, mask: patch.mask, column: x, row: self.row };
         let known = lookup.known(&self.outcomes, &pixels, &mut values);
+        let width = self.gbuffer.width.max(1) as usize;
         for bit in bits_of(known.answered) {
             self.values[bit / TILE * width + x + bit % TILE] = values[bit];
         }
@@ -226,6 +227,18 @@ impl<L: PatchLookup> RowOfTiles<'_, L> {
             self.ask(x, bit, true);
         }
         true
+    }
+
+    /// One V for all of the patch, in a tile with the pixels `whole`.
+    fn fill(&mut self, patch: &Patch, x: usize, whole: u64, v: f32) {
+        let width = self.gbuffer.width.max(1) as usize;
+        self.counts[1] += u64::from(patch.mask.count_ones());
+        if patch.mask == whole {
+            let columns = TILE.min(width - x);
+            self.values.chunks_mut(width).for_each(|line| line[x..x + columns].fill(v));
+        } else {
+            bits_of(patch.mask).for_each(|bit| self.values[bit / TILE * width + x + bit % TILE] = v);
+        }
     }
 
     /// One pixel, by what the table says of its patch or without.
