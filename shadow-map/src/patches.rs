@@ -3,7 +3,8 @@
 //! Neighbouring pixels mostly see one triangle and are looked up in a few texels, far from any edge of a shadow. The
 //! questions of [`receiver_plane`](crate::receiver_plane) are distances and angles, so they are asked once, for a box
 //! around all the pixels' positions: where the answer is the same with the box's size and every rounding allowed for,
-//! it is that of each pixel, bit for bit. What is not certain is asked pixel by pixel.
+//! it is that of each pixel, bit for bit. To a filter it is also said which question alone is left: whether the pixel's own texel
+//! shadows it, or where its plane lies. What is not certain is asked pixel by pixel.
 
 use std::ops::Range;
 
