@@ -39,8 +39,8 @@ pub use params::{ErrorMeasure, PdsmParams, Precision};
 use surfaces::Surfaces;
 pub use technique::Factory;
 
-/// Texels a side of the one map of a light without extent, unless its setting says more: the index alone takes 64 MiB.
-const MOST_OF_ONE_MAP: u32 = 4096;
+/// Texels a side of the one map of a light without extent, unless its setting says more: the index alone takes 256 MiB.
+const MOST_OF_ONE_MAP: u32 = 8192;
 
 /// The technique: settings, from which any number of lights can be prepared.
 #[derive(Clone, Copy, Debug, Default)]
@@ -70,16 +70,18 @@ impl Pdsm {
     /// The maps' resolution and the PDSM's pixels on it.
     ///
     /// A light without extent takes one map, which gets the texels of all `views` of them, shared by the scene's window and
-    /// those of what is seen: it has no penumbra that would hide how coarse they are. [`MOST_OF_ONE_MAP`] a side at most.
+    /// those of what is seen: it has no penumbra that would hide how coarse they are. [`MOST_OF_ONE_MAP`] a side at most. A ray
+    /// passes each of them, since the few events of one map cost little more than the ray's place in the index.
     fn grid(&self, light: &Light) -> (u32, PixelGrid) {
         let PdsmParams { views, map_size, pdsm_size, cascades, .. } = self.params;
-        let (mut map_size, mut size) = (map_size, pdsm_size.max(1));
+        let size = pdsm_size.max(1);
+        let ratio = map_size.div_ceil(size).max(1);
         if !light.is_extended() {
             let times = (views / (1 + cascades)).isqrt().max(1);
-            let larger = |side: u32| side.saturating_mul(times).min(MOST_OF_ONE_MAP).max(side);
-            (map_size, size) = (larger(map_size), larger(size));
+            let side = size * ratio;
+            let size = side.saturating_mul(times).min(MOST_OF_ONE_MAP).max(side);
+            return (size, PixelGrid { size, ratio: 1 });
         }
-        let ratio = map_size.div_ceil(size).max(1);
         (size * ratio, PixelGrid { size, ratio })
     }
 

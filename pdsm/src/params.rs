@@ -36,7 +36,8 @@ pub struct PdsmParams {
     pub views: u32,
     /// Texels a side of each shadow map. Rounded up to a multiple of `pdsm_size`.
     pub map_size: u32,
-    /// Pixels a side of the PDSM. What is between its pixels is interpolated.
+    /// Pixels a side of the PDSM. What is between its pixels is interpolated. For a light without extent it has one for each texel of its
+    /// only map.
     pub pdsm_size: u32,
     /// Parts of what the camera sees, by distance, that may have a window of their own beside the scene's: each takes all maps
     /// again, where they make texels at least half as long. 0 makes one PDSM for any camera, as presets do.
