@@ -147,7 +147,7 @@ impl<S: Simd> Lines<'_, S> {
             self.last = passes.select(t, self.last);
             let fails = neither & !passes;
             at_step = fails.select(self.value(before, t), at_step);
-            ends = ends | fails;
+            ends |= fails;
         }
         self.begin(simd, ends, [t, at_step]);
         // At the origin itself no slope helps: the step is passed or not. That of the very first step is 1, too.
@@ -193,13 +193,13 @@ fn draw<S: Simd>(simd: S, rows: &[Row], levels: &Levels, most: usize, nodes: &mu
         };
         // One more in shadow, or one less.
         let change = i32x16::splat(simd, 1) - ((now & 1) << 1);
-        shadowed = shadowed + now.simd_eq(NOTHING as i32).select(none, change);
+        shadowed += now.simd_eq(NOTHING as i32).select(none, change);
         let after = shadowed.max(0).min(levels.views as i32);
         // All that happens at one depth is one step.
         let steps = !((now ^ next) & !1).simd_eq(0) & !after.simd_eq(before);
         if steps.any_true() {
             let value = one - after.to_float::<f32x16<S>>() * levels.share;
-            needed = needed | (steps & after.simd_ge(levels.needed as i32));
+            needed |= steps & after.simd_ge(levels.needed as i32);
             lines.visit_step(simd, steps, depth(simd, now), [side, value], bound);
             side = steps.select(value, side);
             before = steps.select(after, before);
