@@ -16,11 +16,32 @@ const LEAN: f64 = 1e-12;
 
 /// Those of `samples` whose ray to the light passes through one of `boxes`.
 pub fn near_shadows(boxes: &[Aabb], light: LightPoint, samples: &[Sample]) -> Vec<Sample> {
-    samples.par_iter().filter(|sample| may_be_shadowed(boxes, light, sample.point)).copied().collect()
+    let boxes: Vec<_> = boxes.iter().map(CasterBox::new).collect();
+    samples.par_iter().filter(|sample| passes_one(&boxes, light, sample.point)).copied().collect()
+}
+
+/// A box, and what must be passed through of it.
+#[derive(Clone, Copy, Debug)]
+struct CasterBox {
+    min: DVec3,
+    max: DVec3,
+    least: f64,
+}
+
+impl CasterBox {
+    fn new(bounds: &Aabb) -> Self {
+        let least = f64::from(bounds.size().length()) * LEAST;
+        Self { min: bounds.min.as_dvec3(), max: bounds.max.as_dvec3(), least }
+    }
 }
 
 /// Whether the ray from `point` to the light passes through one of `boxes`.
 pub fn may_be_shadowed(boxes: &[Aabb], light: LightPoint, point: DVec3) -> bool {
+    let boxes: Vec<_> = boxes.iter().map(CasterBox::new).collect();
+    passes_one(&boxes, light, point)
+}
+
+fn passes_one(boxes: &[CasterBox], light: LightPoint, point: DVec3) -> bool {
     let (ray, end) = match light {
         LightPoint::Towards(towards) => (towards.as_dvec3(), f64::INFINITY),
         LightPoint::At(place) => (place.as_dvec3() - point, 1.0),
@@ -30,10 +51,9 @@ pub fn may_be_shadowed(boxes: &[Aabb], light: LightPoint, point: DVec3) -> bool 
     let inverse = ray.to_array().map(|r| 1.0 / if r.abs() > least { r } else { least });
     let inverse = DVec3::from_array(inverse);
     boxes.iter().any(|b| {
-        let low = (b.min.as_dvec3() - point) * inverse;
-        let high = (b.max.as_dvec3() - point) * inverse;
+        let (low, high) = ((b.min - point) * inverse, (b.max - point) * inverse);
         let (enter, leave) = (low.min(high).max_element().max(0.0), low.max(high).min_element().min(end));
-        (leave - enter) * length > f64::from(b.size().length()) * LEAST
+        (leave - enter) * length > b.least
     })
 }
 

@@ -22,6 +22,7 @@
 //! ```
 
 use glam::{DVec2, DVec3, Vec2};
+use rayon::prelude::*;
 
 use crate::aliasing::surface_from_place;
 use crate::caster_image::{DIRECTIONS, direction};
@@ -198,9 +199,10 @@ pub fn least(image: &Warp, window: &Window, receivers: &[DVec3], near_shadows: &
     let mut step = FIRST_STEP;
     for round in 0..=ROUNDS {
         let center = best.0;
-        for index in 0..CHOICES {
-            let shape = if round == 0 { first(index) } else { around(center, step, index) };
-            let error = measure.of(shape);
+        let shape = |index| if round == 0 { first(index) } else { around(center, step, index) };
+        let indices = (0..CHOICES).into_par_iter().with_min_len(CHOICES / 4);
+        let errors: Vec<f32> = indices.map(|index| measure.of(shape(index))).collect();
+        for (shape, error) in (0..CHOICES).map(shape).zip(errors) {
             if error < best.1 * (1.0 - SAME) {
                 best = (shape, error);
             }

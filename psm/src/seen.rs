@@ -103,6 +103,8 @@ pub struct Wanted<'a> {
     rays: CameraRays,
     center: LightPoint,
     receives: Vec<bool>,
+    /// Whether every object does.
+    all_receive: bool,
     /// A spot's place, unit axis and cosine, widened by 16 roundings of `Light::reaches`.
     cone: Option<(Vec3, Vec3, f32)>,
 }
@@ -122,12 +124,13 @@ impl<'a> Wanted<'a> {
             }
             _ => None,
         };
-        let receives = scene.objects().iter().map(|object| object.flags.receives).collect();
+        let receives: Vec<_> = scene.objects().iter().map(|object| object.flags.receives).collect();
         Self {
             gbuffer,
             eye: camera.eye.as_dvec3(),
             rays: camera.rays(),
             center: light.center(),
+            all_receive: receives.iter().all(|receives| *receives),
             receives,
             cone,
         }
@@ -146,7 +149,8 @@ impl<'a> Wanted<'a> {
                 (normal.dot(to_light), to_light.length_squared())
             }
         };
-        let receives = || self.receives.get(self.gbuffer.object[pixel] as usize).is_some_and(|r| *r);
+        let receives =
+            || self.all_receive || self.receives.get(self.gbuffer.object[pixel] as usize).is_some_and(|r| *r);
         let reached = || {
             self.cone.is_none_or(|(place, axis, cos)| {
                 let from = self.gbuffer.position[pixel] - place;
@@ -187,11 +191,14 @@ impl<'a> Wanted<'a> {
         tiles: &mut [Tile],
         image_of: &(impl Fn(Vec3) -> usize + Sync),
     ) {
+        if let [tile] = tiles {
+            return self.look_at_one(grid, place, tile);
+        }
         let depth = &self.gbuffer.depth;
         let mut off_middle = [u32::MAX; FACES.len()];
         for (x, y, pixel) in self.pixels(grid, place) {
             let Some(counts) = self.at(pixel) else { continue };
-            let image = if tiles.len() == 1 { 0 } else { image_of(self.gbuffer.position[pixel]) };
+            let image = image_of(self.gbuffer.position[pixel]);
             let (tile, off_middle) = (&mut tiles[image], &mut off_middle[image]);
             if tile.nearest == GBuffer::NOTHING || depth[pixel] < depth[tile.nearest as usize] {
                 tile.nearest = pixel as u32;
@@ -202,6 +209,43 @@ impl<'a> Wanted<'a> {
             let off = grid.off_middle(x, y);
             if counts && off < *off_middle {
                 (*off_middle, tile.sample) = (off, pixel as u32);
+            }
+        }
+    }
+
+    /// As [`look_at`](Self::look_at) where there is one image: most pixels change nothing, and are told by their depth alone.
+    fn look_at_one(&self, grid: TileGrid, [column, row]: [usize; 2], tile: &mut Tile) {
+        let (width, height, side) = (self.gbuffer.width, self.gbuffer.height, grid.side);
+        let (left, top) = (column as u32 * side, row as u32 * side);
+        let (mut nearest, mut farthest, mut off_middle) = (f32::INFINITY, f32::NEG_INFINITY, u32::MAX);
+        // Mostly it is the middle itself.
+        let middle = (left + side / 2, top + side / 2);
+        let pixel = middle.1 as usize * width as usize + middle.0 as usize;
+        if middle.0 < width && middle.1 < height && self.at(pixel) == Some(true) {
+            (off_middle, tile.sample) = (0, pixel as u32);
+        }
+        for y in top..(top + side).min(height) {
+            let first = y as usize * width as usize + left as usize;
+            let depths = &self.gbuffer.depth[first..first + (width - left).min(side) as usize];
+            let off_row = (y - top).abs_diff(side / 2);
+            for (x, &depth) in (0u32..).zip(depths) {
+                let off = off_row + x.abs_diff(side / 2);
+                // NaN and infinity are none of these.
+                let spreads = depth < nearest || (depth > farthest && depth < f32::INFINITY);
+                if !(spreads || off < off_middle) {
+                    continue;
+                }
+                let pixel = first + x as usize;
+                let Some(counts) = self.at(pixel) else { continue };
+                if depth < nearest {
+                    (nearest, tile.nearest) = (depth, pixel as u32);
+                }
+                if depth > farthest {
+                    (farthest, tile.farthest) = (depth, pixel as u32);
+                }
+                if counts && off < off_middle {
+                    (off_middle, tile.sample) = (off, pixel as u32);
+                }
             }
         }
     }

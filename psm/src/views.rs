@@ -49,7 +49,7 @@ pub struct Images {
     /// One, or one for each face of a cube around a light at a place that may see receivers in all directions.
     pub images: Vec<LightImage>,
     /// For each image, the paper's shift of the camera in scene units: by as much as the casters' region H reaches nearer
-    /// than the receivers that it belongs to.
+    /// than the receivers that it belongs to. 0 for variants that have no virtual camera.
     pub papers_shift: Vec<f64>,
     /// Bounds of all that casts.
     pub casters: Aabb,
@@ -61,15 +61,22 @@ pub struct Images {
 
 impl Images {
     /// For what `camera` may see, with the bounds of each object that casts.
-    pub fn new(scene: &Scene, light: &Light, camera: &Camera, boxes: Vec<Aabb>) -> Self {
+    pub fn new(scene: &Scene, light: &Light, camera: &Camera, boxes: Vec<Aabb>, variant: Variant) -> Self {
+        let (frame, center) = (ViewFrame::new(camera), light.center());
+        let has_shift = variant == Variant::Psm;
+        if let (LightPoint::Towards(towards), false) = (center, has_shift) {
+            let image = LightImage::new(center, towards.as_dvec3(), frame.forward);
+            return Self::with_boxes(vec![image], vec![0.0], boxes);
+        }
         let receivers = Receivers::seen_by(scene, camera, light);
         let corners: Vec<_> = receivers.region().vertices().collect();
-        let frame = ViewFrame::new(camera);
-        let center = light.center();
         let nearest = |region: &Polyhedron| {
             region.vertices().map(|point| frame.depth(point)).fold(f64::INFINITY, f64::min)
         };
         let shift = |receivers: &Receivers| {
+            if !has_shift {
+                return 0.0;
+            }
             let region = CasterRegion::between(scene, receivers, light);
             virtual_camera::holding(nearest(receivers.region()), nearest(region.polyhedron()))
         };
@@ -83,6 +90,10 @@ impl Images {
                 })
                 .unzip(),
         };
+        Self::with_boxes(images, papers_shift, boxes)
+    }
+
+    fn with_boxes(images: Vec<LightImage>, papers_shift: Vec<f64>, boxes: Vec<Aabb>) -> Self {
         let casters = boxes.iter().fold(Aabb::EMPTY, |sum, &bounds| sum.union(bounds));
         let filled = images.iter().map(|image| CasterImage::new(image, &boxes)).collect();
         Self { images, papers_shift, casters, boxes, filled }
@@ -112,7 +123,8 @@ pub fn map_views(
     if boxes.iter().all(Aabb::is_empty) {
         return Vec::new();
     }
-    let images = report.time("prepare.images", |_| Images::new(scene, light, camera, boxes.to_vec()));
+    let images =
+        report.time("prepare.images", |_| Images::new(scene, light, camera, boxes.to_vec(), params.variant));
     let wanted = Wanted::new(scene, gbuffer, camera, light);
     let seen = report
         .time("prepare.receivers", |_| wanted.seen(images.images.len(), |point| images.image_of(point)));

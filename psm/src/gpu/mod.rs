@@ -185,7 +185,7 @@ impl PsmOnGpu {
                 if has_solids { relevance::told_apart_with_solids } else { relevance::told_apart };
             let casters = told_apart(&geometry, query.light, tolerance);
             let boxes = casters.drawn.iter().map(|object| object.bounds).collect();
-            (casters, Images::new(&geometry, query.light, query.camera, boxes))
+            (casters, Images::new(&geometry, query.light, query.camera, boxes, self.params.variant))
         });
         report.skip("casters", casters.backdrops.len() as u64);
         let is_drawn = |id: usize| {
