@@ -312,6 +312,12 @@ impl<'a> Seen<'a> {
         };
         let nothing = (Window::EMPTY, [f64::INFINITY, f64::NEG_INFINITY]);
         let first = self.ends.iter().copied().filter(|&p| holds(p)).fold(nothing, with);
+        let (window, [least, largest]) = first;
+        // Not so for NaN.
+        let spans = |point: DVec3| {
+            let (w, place) = (at(warp.w, point), warp.place(point));
+            (least..=largest).contains(&w) && place.cmpge(window.min).all() && place.cmple(window.max).all()
+        };
         let position = &self.wanted.gbuffer.position;
         let columns = self.grid.columns as usize;
         let asked = self.tiles.par_iter().enumerate().filter_map(|(index, tile)| {
@@ -330,11 +336,15 @@ impl<'a> Seen<'a> {
                 && first.0.union(around.0) == first.0
                 && around.1[0] >= first.1[0]
                 && around.1[1] <= first.1[1];
+            if is_inside {
+                return None;
+            }
             let pixels = self.wanted.pixels(self.grid, place).map(|(_, _, pixel)| pixel);
-            let points = pixels.filter(|&pixel| self.wanted.at(pixel).is_some()).map(|pixel| position[pixel]);
-            (!is_inside).then(|| {
-                points.filter(|&p| is_of(p)).map(Vec3::as_dvec3).filter(|&p| holds(p)).fold(nothing, with)
-            })
+            // Of most pixels the place alone tells that they add nothing.
+            let adds = pixels.filter(|&pixel| !spans(position[pixel].as_dvec3()));
+            let points = adds.filter(|&pixel| self.wanted.at(pixel).is_some()).map(|pixel| position[pixel]);
+            let of_image = points.filter(|&p| is_of(p)).map(Vec3::as_dvec3).filter(|&p| holds(p));
+            Some(of_image.fold(nothing, with))
         });
         asked.reduce(
             || first,
