@@ -157,7 +157,9 @@ impl Case<'_> {
 fn main() -> Result<(), Error> {
     let Wanted { size, samples, all, scenes } = wanted()?;
     let mut wins = Wins::default();
-    println!("| scene | ddoc, ms | rmse | `pen_rmse` | smoothies | penumbra-map | PCSS in time | ms | rmse |");
+    println!(
+        "| scene | ddoc, ms | rmse | `pen_rmse` | smoothies | penumbra-map | PCSS in time | ms | rmse |"
+    );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for name in scenes {
         let mut setup = load(&name)?;
