@@ -2,9 +2,10 @@
 
 mod views;
 
+use glam::Vec3;
 use gnomon_shadow_map::{Kernel, ShadowMap, ShadowMapParams, Variant};
 use scene_core::relevance::CasterChunks;
-use scene_core::{Light, Scene, VisibilityImage, raster, scenes};
+use scene_core::{Camera, Light, Scene, VisibilityImage, raster, scenes};
 use views::random_view;
 
 /// All but those that choose what they draw while they shade.
@@ -45,7 +46,7 @@ fn compare_scene(spec: &str) {
     let inside = bounds.center() + 0.2 * bounds.size();
     let spot = Light::Spot {
         position: inside,
-        direction: bounds.center() - inside - glam::Vec3::Y,
+        direction: bounds.center() - inside - Vec3::Y,
         outer: 0.6,
         inner: 0.3,
     };
@@ -85,7 +86,7 @@ fn forest() {
 #[test]
 fn faces_that_nobody_sees_are_not_drawn() {
     let setup = scenes::build("forest:triangles=20000", 0.0).expect("a built-in scene");
-    let camera = scene_core::Camera { fov_y: 0.1, ..setup.camera.with_size(64, 64) };
+    let camera = Camera { fov_y: 0.1, ..setup.camera.with_size(64, 64) };
     let center = setup.scene.bounds().center();
     let chunks = CasterChunks::new(&setup.scene);
     let lamp = Light::Sphere { center, radius: 0.002 };
@@ -152,4 +153,28 @@ fn coarse_maps_are_looked_up_together() {
     }
     println!("{known:?} of {shaded} pixels known from tables");
     assert!(known.iter().all(|&known| known * 40 > shaded), "{known:?} of {shaded}");
+}
+
+/// A step from hilly ground under trees: texels wider than a tile, and ground beside ground that is flat but for a little.
+#[test]
+fn ground_seen_close_up() {
+    let setup = scenes::build("forest:triangles=100000", 0.0).expect("a built-in scene");
+    let camera = Camera {
+        eye: Vec3::new(2.0, 1.7, 1.0),
+        target: Vec3::new(2.8, 0.0, 0.2),
+        fov_y: 0.7,
+        ..setup.camera.with_size(256, 256)
+    };
+    let gbuffer = raster::render_gbuffer(&setup.scene, &camera);
+    for (variant, map_size) in [(Variant::Pcf, 1024), (Variant::Pcf, 256), (Variant::ObjectId, 512)] {
+        let params = ShadowMapParams { variant, map_size, ..Default::default() };
+        let [on, off] = [true, false].map(|skip| {
+            let technique = ShadowMap::new(ShadowMapParams { skip, ..params });
+            let (maps, _) = technique.prepare(&setup.scene, &setup.lights[0]);
+            let mut image = VisibilityImage::new(camera.width, camera.height);
+            maps.shade(&gbuffer, &mut image);
+            image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
+        });
+        assert_eq!(on.iter().zip(&off).filter(|(a, b)| a != b).count(), 0, "{params:?}");
+    }
 }
