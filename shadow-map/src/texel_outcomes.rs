@@ -171,8 +171,8 @@ impl TexelOutcomes {
                     Outcome::Clear => {}
                     Outcome::Blocks => bits.blocks |= bit,
                     Outcome::AsOwn => {
-                        (bits.at_most_own, bits.at_least_own) =
-                            (bits.at_most_own | bit, bits.at_least_own | bit)
+                        bits.at_most_own |= bit;
+                        bits.at_least_own |= bit;
                     }
                     Outcome::AtMostOwn => bits.at_most_own |= bit,
                     Outcome::AtLeastOwn => bits.at_least_own |= bit,
