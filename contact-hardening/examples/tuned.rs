@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let case = Case::new(&file.to_string_lossy(), [512, 512], 1024)?;
         let errors = case.errors(&case.run(&technique)?.0)?;
         println!(
-            "| {name} | {engine} | {bar} | {:.4} | {:.3} | {:.4} |",
+            "| {name} | {engine} | {bar:.3} | {:.4} | {:.3} | {:.4} |",
             errors.rmse, errors.p99, errors.pen_rmse
         );
         if errors.rmse > bar {
