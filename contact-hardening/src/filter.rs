@@ -3,6 +3,9 @@
 //! With `blocker = each` a point is asked at several distances, layers, between the nearest and the farthest blocker: it is dark
 //! if the line to it passes a stored blocker, or goes from above to below stored ones, between two of them.
 //!
+//! Where even the farthest blocker's penumbra is too narrow for neighbours to be [averaged](crate::smoothing), twice as many points are
+//! asked. The pyramid tells how far that is: what a search finds would make it a matter of chance.
+//!
 //! What the map answers is answered by texels. Where the footprint is narrower than one, they answer all of the light alike, and an S
 //! that another technique found for the very pixel says more: it is taken there.
 
@@ -66,6 +69,8 @@ impl Layers {
                     *t = blockers.least * ratio.powf(index as f32 / last);
                 }
                 if layers.count > 1 {
+                    // However a power is rounded: on the GPU it is by some units.
+                    layers.t[layers.count - 1] = blockers.greatest;
                     layers.half = 0.5 * ratio.ln() / last;
                 }
             }
@@ -106,8 +111,10 @@ impl Physical<'_> {
         let asker = Asker { physical: self, site, lines, map_first, fill: &fill, layers: &layers };
         let (mut dark, mut all) = (0.0, 0.0);
         let mut states = [State::default(); BATCH];
-        let mut weights = self.kernel.weights.iter();
-        batches(self.points(site).map(|(at, _)| at), |points| {
+        let is_fine = self.is_narrow(site, site.t);
+        let kernel = if is_fine { self.fine } else { self.kernel };
+        let mut weights = kernel.weights.iter();
+        batches(self.points_of(kernel, site).map(|(at, _)| at), |points| {
             let states = &mut states[..points.len()];
             states.fill(State::default());
             for layer in 0..layers.count {

@@ -33,6 +33,12 @@ impl ContactHardeningParams {
             Scaling::Paper => Kernel::gaussian(self.taps, self.seed),
         }
     }
+
+    /// The kernel of twice as many points with `physical` scaling.
+    pub fn fine_kernel_for(&self, light: &Light) -> Kernel {
+        let times = if self.scaling == Scaling::Physical { 2 } else { 1 };
+        Self { taps: self.taps * times, ..*self }.kernel_for(light)
+    }
 }
 
 impl Kernel {
@@ -103,7 +109,8 @@ fn square_points(taps: u32) -> Vec<Vec2> {
 /// The seeds of a sunflower (Vogel 1979): equal areas within equal radii, turned on by the golden angle. It may be turned by any angle.
 /// Of the disk the numbers above are 0.0125 and, by the concentric map of a (0, 2)-sequence, 0.0149; of strips 0.0165 and 0.0206.
 fn disk_points(taps: u32) -> Vec<Vec2> {
-    let turn = |index: u32| ((f64::from(index) * GOLDEN).fract() * std::f64::consts::TAU) as f32;
+    let golden_angle = std::f64::consts::TAU * (1.0 - GOLDEN);
+    let turn = |index: u32| (f64::from(index) * golden_angle) as f32;
     let radius = |index: u32| ((index as f32 + 0.5) / taps as f32).sqrt();
     (0..taps).map(|index| Vec2::from_angle(turn(index)) * radius(index)).collect()
 }
@@ -163,7 +170,7 @@ mod tests {
         let (mut sum, mut count) = (0.0, 0u32);
         for pixel in 0..pixels {
             let numbers = gnomon_shadow_map::pixel_hash::pixel_numbers([pixel, 1], 0);
-            let across = Vec2::from_angle(2.4 * pixel as f32);
+            let across = Vec2::from_angle(2.4 * pixel as f32 + 0.3);
             let extent = if kernel.is_square { across.abs().element_sum() } else { 1.0 };
             for place in 0..16 {
                 let edge = ((place as f32 + 0.5) / 8.0 - 1.0) * extent;

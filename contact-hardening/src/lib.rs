@@ -60,6 +60,7 @@ pub struct PreparedContactHardening<'a> {
     params: ContactHardeningParams,
     look_ups: LookUps<'a>,
     kernel: Kernel,
+    fine: Kernel,
     source: Option<Box<dyn PreparedShadow + 'a>>,
 }
 
@@ -162,7 +163,8 @@ impl ContactHardening {
             None => None,
         };
         let kernel = params.kernel_for(query.light);
-        Ok((PreparedContactHardening { params, look_ups, kernel, source }, report))
+        let fine = params.fine_kernel_for(query.light);
+        Ok((PreparedContactHardening { params, look_ups, kernel, fine, source }, report))
     }
 }
 
@@ -218,6 +220,7 @@ impl PreparedContactHardening<'_> {
                     distance: &map,
                     pyramid: &pyramid,
                     kernel: &self.kernel,
+                    fine: &self.fine,
                     clip_from_world: camera.with_size(gbuffer.width, gbuffer.height).projection_from_world(),
                     has_source: hard.is_some(),
                 };

@@ -44,6 +44,8 @@ pub struct Physical<'a> {
     pub pyramid: &'a ShadowPyramid,
     /// Points of pass 4.
     pub kernel: &'a Kernel,
+    /// Twice as many, where neighbours are not averaged.
+    pub fine: &'a Kernel,
     /// World to the camera's clip space.
     pub clip_from_world: Mat4,
     /// Whether S is another technique's, and not the map's.
@@ -130,9 +132,18 @@ impl Physical<'_> {
     }
 
     /// Points of the light as this pixel sees them, and what they weigh.
-    pub(crate) fn points(&self, site: &Site) -> impl Iterator<Item = (Vec2, f32)> + '_ {
+    pub(crate) fn points(&self, site: &Site) -> impl Iterator<Item = (Vec2, f32)> + use<'_> {
+        self.points_of(self.kernel, site)
+    }
+
+    /// The same of another kernel.
+    pub(crate) fn points_of<'k>(
+        &self,
+        kernel: &'k Kernel,
+        site: &Site,
+    ) -> impl Iterator<Item = (Vec2, f32)> + use<'k> {
         let cone = site.cone;
-        let turned = self.kernel.turned(pixel_numbers(site.receiver.pixel, self.params.seed));
+        let turned = kernel.turned(pixel_numbers(site.receiver.pixel, self.params.seed));
         turned.map(move |(point, weight)| (cone.share(point), weight))
     }
 

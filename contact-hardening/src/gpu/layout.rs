@@ -58,6 +58,8 @@ pub struct SettingsTable {
     pub level: [[u32; 4]; MOST_LEVELS],
     /// Points and weights.
     pub points: [[f32; 4]; MOST_POINTS],
+    /// The same of twice as many.
+    pub fine: [[f32; 4]; 2 * MOST_POINTS],
 }
 
 impl SettingsTable {
@@ -65,14 +67,11 @@ impl SettingsTable {
     pub fn new(
         params: &ContactHardeningParams,
         kernel: &Kernel,
+        fine: &Kernel,
         is_parallel: bool,
         has_source: bool,
         size: [u32; 2],
     ) -> Self {
-        let mut points = [[0.0; 4]; MOST_POINTS];
-        for (into, (point, weight)) in points.iter_mut().zip(kernel.points.iter().zip(&kernel.weights)) {
-            *into = [point.x, point.y, *weight, 0.0];
-        }
         let mut level = [[0; 4]; MOST_LEVELS];
         let levels = levels(size);
         for (into, from) in level.iter_mut().zip(&levels) {
@@ -107,9 +106,18 @@ impl SettingsTable {
             dilate: params.dilate / 2,
             kernel_size: params.kernel_size,
             level,
-            points,
+            points: points_of(kernel),
+            fine: points_of(fine),
         }
     }
+}
+
+fn points_of<const MOST: usize>(kernel: &Kernel) -> [[f32; 4]; MOST] {
+    let mut points = [[0.0; 4]; MOST];
+    for (into, (point, weight)) in points.iter_mut().zip(kernel.points.iter().zip(&kernel.weights)) {
+        *into = [point.x, point.y, *weight, 0.0];
+    }
+    points
 }
 
 /// `Level` of `pyramid.wesl`.
@@ -197,7 +205,8 @@ mod tests {
                 dilate,
                 kernel_size,
                 level,
-                points
+                points,
+                fine
             ]
         );
         assert_layout!(LevelUniform, PYRAMID, "Level", [pixels, tiles, below, start, start_below]);

@@ -106,6 +106,7 @@ struct Prepared {
     backs: Bound,
     scene: SceneGroups,
     kernel: Kernel,
+    fine: Kernel,
     is_parallel: bool,
 }
 
@@ -212,6 +213,7 @@ impl ContactHardeningOnGpu {
                 maps: vec![drawn.maps.into(), drawn.views.into(), drawn.ids, depths.into()],
                 scene,
                 kernel: self.technique.params.kernel_for(query.light),
+                fine: self.technique.params.fine_kernel_for(query.light),
                 is_parallel: matches!(query.light, Light::Directional { .. }),
             });
         }
@@ -251,6 +253,7 @@ impl ContactHardeningOnGpu {
         let settings = SettingsTable::new(
             &self.technique.params,
             &prepared.kernel,
+            &prepared.fine,
             prepared.is_parallel,
             source.is_some(),
             size,
