@@ -23,13 +23,14 @@ mod technique;
 mod tunnel;
 pub mod walk;
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::Vec3;
 use gnomon_shadow_map::receiver_plane::plane_tolerance;
 use scene_core::geometry::Object;
 use scene_core::relevance::{self, CasterRegion, Receivers};
-use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
+use scene_core::{Camera, GBuffer, Light, Origin, Report, Scene, VisibilityImage};
 
 use cpu::{Lookup, Window};
 use functions::Functions;
@@ -52,7 +53,9 @@ pub struct Pdsm {
 /// sees ([`Pdsm::prepare_for`]) are of use to it alone.
 #[derive(Debug)]
 pub struct PreparedPdsm<'a> {
-    scene: &'a Scene,
+    /// What scene, light and windows count from.
+    origin: Origin,
+    scene: Cow<'a, Scene>,
     light: Light,
     windows: Arc<[Window]>,
     /// Windows over casters that have a PDSM of their own.
@@ -102,10 +105,22 @@ impl Pdsm {
         light: &Light,
         camera: Option<&Camera>,
     ) -> (PreparedPdsm<'a>, Report) {
+        self.counted_from(Origin::near(scene.bounds()), scene, light, camera)
+    }
+
+    /// [`prepare_for`](Self::prepare_for) in coordinates of its own.
+    fn counted_from<'a>(
+        &self,
+        origin: Origin,
+        scene: &'a Scene,
+        light: &Light,
+        camera: Option<&Camera>,
+    ) -> (PreparedPdsm<'a>, Report) {
         let mut report = Report::default();
-        let (windows, tolerance) = self.windows(scene, light, camera, |_| true, &mut report);
-        let (light, moving) = (*light, Arc::default());
-        (PreparedPdsm { scene, light, windows, moving, tolerance, params: self.params }, report)
+        let (scene, light, moving) = (origin.scene(scene), origin.light(light), Arc::default());
+        let camera = camera.map(|camera| origin.camera(camera));
+        let (windows, tolerance) = self.windows(&scene, &light, camera.as_ref(), |_| true, &mut report);
+        (PreparedPdsm { origin, scene, light, windows, moving, tolerance, params: self.params }, report)
     }
 
     /// Windows with functions over those casters of `scene` that are `meant`, and the tolerance of lookups.
@@ -203,7 +218,7 @@ impl Pdsm {
 impl PreparedPdsm<'_> {
     fn lookup(&self) -> Lookup<'_> {
         Lookup {
-            scene: self.scene,
+            scene: &self.scene,
             light: &self.light,
             windows: &self.windows,
             moving: &self.moving,
@@ -240,7 +255,8 @@ impl PreparedPdsm<'_> {
         (parts - kept) as u64
     }
 
-    /// The windows, with their functions: those of parts first.
+    /// The windows, with their functions: those of parts first. Their coordinates are the scene's own where that lies far from zero
+    /// (see [`Origin`]).
     pub fn windows(&self) -> &[Window] {
         &self.windows
     }
@@ -262,7 +278,7 @@ impl PreparedPdsm<'_> {
         let mut report = Report::default();
         let pdsm = Pdsm::new(self.params);
         (self.moving, _) =
-            pdsm.windows(self.scene, &self.light, None, |object| object.flags.dynamic, &mut report);
+            pdsm.windows(&self.scene, &self.light, None, |object| object.flags.dynamic, &mut report);
         report.bytes = self.bytes();
         report
     }
@@ -270,7 +286,8 @@ impl PreparedPdsm<'_> {
     /// Fills `visibility`, which must have the G-buffer's size: V where a surface is seen, NaN elsewhere.
     pub fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Report {
         let mut report = Report::default();
-        report.time("shade.lookup", |_| cpu::shade(&self.lookup(), gbuffer, visibility));
+        let gbuffer = self.origin.gbuffer(gbuffer);
+        report.time("shade.lookup", |_| cpu::shade(&self.lookup(), &gbuffer, visibility));
         report
     }
 
@@ -283,9 +300,11 @@ impl PreparedPdsm<'_> {
             visibility.fill(f32::NAN);
             return report;
         }
-        report.time("shade.lookup", |_| {
-            cpu::free_points(&lookup, points, visibility);
-        });
+        let points = match self.origin.is_world() {
+            true => Cow::Borrowed(points),
+            false => points.iter().map(|&point| self.origin.point(point)).collect(),
+        };
+        report.time("shade.lookup", |_| cpu::free_points(&lookup, &points, visibility));
         report
     }
 }

@@ -13,6 +13,7 @@
 mod record;
 mod words;
 
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -20,7 +21,7 @@ use gnomon_shadow_map::receiver_plane::plane_tolerance;
 use scene_core::geometry::Object;
 use scene_core::io::write::{self, WriteError};
 use scene_core::technique::TechniqueError;
-use scene_core::{Light, Report, Scene};
+use scene_core::{Light, Origin, Report, Scene};
 use thiserror::Error;
 
 use crate::cpu::Window;
@@ -176,7 +177,9 @@ impl Baked {
         }
         let mut report = Report::default();
         let mut prepared = PreparedPdsm {
-            scene,
+            // What is kept must not hang on where dynamic objects are now.
+            origin: Origin::WORLD,
+            scene: Cow::Borrowed(scene),
             light: *light,
             windows: Arc::clone(&self.windows),
             moving: Arc::default(),

@@ -12,7 +12,7 @@ use scene_core::gpu::{
     SceneGroups, VisibilityPass, VisibilityPassParts, binding, binding_limit, storage_buffer,
 };
 use scene_core::technique::{Params as _, TechniqueError};
-use scene_core::{Camera, Report};
+use scene_core::{Camera, Origin, Report};
 
 use crate::baked::{self, Baked};
 use crate::{Pdsm, PdsmParams, PreparedPdsm};
@@ -97,7 +97,10 @@ impl PdsmOnGpu {
             why: "its maps are drawn on the CPU: hand over the geometry in memory, too".to_owned(),
         })?;
         let (mut pdsm, mut report) = match &self.source {
-            Source::Built(technique) => technique.prepare_for(geometry, query.light, Some(query.camera)),
+            // Receivers come from the G-buffer pass in world space.
+            Source::Built(technique) => {
+                technique.counted_from(Origin::WORLD, geometry, query.light, Some(query.camera))
+            }
             Source::Baked(baked) => baked.prepare(geometry, query.light).map_err(baked::refused)?,
         };
         let most = binding_limit(recorder.device);
