@@ -65,6 +65,8 @@ pub fn shade(
 /// `shade.splat`: the splats of each view, over receivers as far as these.
 fn splats(prepared: &PreparedDdoc<'_>, farthest: &[Farthest]) -> Vec<TileLists> {
     let (edges, origin) = (&prepared.edges, prepared.origin);
+    // A light without extent has no penumbrae: no receiver asks for an edge.
+    let is_asked = !prepared.skip || prepared.base.light.is_extended();
     let ends = |edge: usize| [edges[edge].a + origin, edges[edge].b + origin];
     let splat = |(layers, farthest): (&Layers, &Farthest)| {
         let image = &layers.image;
@@ -73,7 +75,7 @@ fn splats(prepared: &PreparedDdoc<'_>, farthest: &[Farthest]) -> Vec<TileLists> 
             is_paper.then(|| image.along(edges[edge].far + origin))
         };
         let (hull, skip) = (prepared.hull.as_ref(), prepared.skip);
-        distortion_map(image, &ends, &reach, edges.len(), hull, farthest, skip)
+        distortion_map(image, &ends, &reach, if is_asked { edges.len() } else { 0 }, hull, farthest, skip)
     };
     prepared.layers.iter().zip(farthest).map(splat).collect()
 }

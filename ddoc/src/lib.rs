@@ -27,7 +27,6 @@ mod technique;
 pub mod tile_edges;
 pub mod tiles;
 
-use std::borrow::Cow;
 use std::collections::HashSet;
 
 use glam::{Vec2, Vec3};
@@ -57,12 +56,12 @@ pub struct Ddoc {
 /// One light's map and edges, borrowing the scene it shines on. Holds for any camera.
 #[derive(Debug)]
 pub struct PreparedDdoc<'a> {
-    /// The scene, the light and the tolerance; no maps.
+    /// The scene, the light, what their coordinates are counted from, and the tolerance; no maps.
     base: LightMaps<'a>,
     /// The map, a view each: solid faces, and all that has its edges from the map.
     faces: Vec<Faces>,
     layers: Vec<Layers>,
-    /// Where edges are counted from.
+    /// Where edges are counted from, in the coordinates of `base`.
     origin: Vec3,
     edges: Vec<Edge>,
     /// Those from here on are outlines of the map.
@@ -93,17 +92,20 @@ impl Ddoc {
         scene: &'a Scene,
         light: &Light,
     ) -> Result<(PreparedDdoc<'a>, Report), TopologyError> {
-        self.prepare_with(scene, light, !self.params.skip)
+        self.prepare_with(Origin::near(scene.bounds()), scene, light, !self.params.skip)
     }
 
-    /// [`prepare`](Self::prepare), with the faces that each texel lists if `by_texels`.
+    /// [`prepare`](Self::prepare) in coordinates counted from a place, with the faces that each texel lists if `by_texels`.
     fn prepare_with<'a>(
         &self,
+        counted_from: Origin,
         scene: &'a Scene,
         light: &Light,
         by_texels: bool,
     ) -> Result<(PreparedDdoc<'a>, Report), TopologyError> {
         let (mut report, params) = (Report::default(), &self.params);
+        let (moved, light) = (counted_from.scene(scene), &counted_from.light(light));
+        let scene = moved.as_ref();
         let tolerance = plane_tolerance(scene.bounds(), light);
         let center = light.center();
         let (casters, images) = report.time("prepare.views", |_| {
@@ -140,6 +142,11 @@ impl Ddoc {
         let (edges, first_outline) = report.time("prepare.silhouettes", |report| {
             let mut edges = match params.variant {
                 Variant::ImageEdges | Variant::Paper => Vec::new(),
+                // Without extent there are no penumbrae: V is what lies before the centre.
+                _ if params.skip && !light.is_extended() => {
+                    report.skip("casters without a penumbra", casters.drawn.len() as u64);
+                    Vec::new()
+                }
                 Variant::Ddoc => object_edges(scene, &casters.drawn, origin, hull.as_ref(), center, report)?,
                 Variant::Smoothies | Variant::PenumbraMap => {
                     let mut edges =
@@ -168,11 +175,11 @@ impl Ddoc {
             + faces.iter().map(|faces| faces.lists().bytes() as u64).sum::<u64>()
             + size_of_val(&edges[..]) as u64;
         let base = LightMaps {
-            origin: Origin::WORLD,
-            scene: Cow::Borrowed(scene),
+            origin: counted_from,
+            backdrops: casters.backdrops.into_iter().cloned().collect(),
+            scene: moved,
             light: *light,
             maps: Vec::new(),
-            backdrops: casters.backdrops.into_iter().cloned().collect(),
             tolerance,
         };
         let points = light_points::light_points(light, params.taps, params.seed);
@@ -222,7 +229,7 @@ impl PreparedDdoc<'_> {
         &self.edges
     }
 
-    /// Where edges are counted from, world space.
+    /// Where edges are counted from: in world space or, of a scene that lies far from zero, in its own ([`Origin`]).
     pub fn origin(&self) -> Vec3 {
         self.origin
     }
@@ -230,7 +237,8 @@ impl PreparedDdoc<'_> {
     /// Fills `visibility`, which must have the G-buffer's size: V where a surface is seen, NaN elsewhere.
     pub fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Report {
         let mut report = Report::default();
-        cpu::shade(self, &mut visibility.values, &mut report, |pixel| receiver(&self.base, gbuffer, pixel));
+        let gbuffer = self.base.origin.gbuffer(gbuffer);
+        cpu::shade(self, &mut visibility.values, &mut report, |pixel| receiver(&self.base, &gbuffer, pixel));
         report
     }
 
@@ -241,7 +249,7 @@ impl PreparedDdoc<'_> {
         let count = points.len().min(visibility.len());
         let (light, base) = (&self.base.light, &self.base);
         cpu::shade(self, &mut visibility[..count], &mut report, |index| {
-            let point = points[index];
+            let point = base.origin.point(points[index]);
             if !point.is_finite() {
                 return Err(f32::NAN);
             }

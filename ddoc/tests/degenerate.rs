@@ -2,9 +2,11 @@
 
 use glam::{Affine3A, Vec3};
 use gnomon_ddoc::{Ddoc, DdocParams, Factory, Variant};
+use scene_core::bvh::Bvh;
 use scene_core::geometry::ObjectFlags;
+use scene_core::reference::{self, ReferenceSettings, no_progress};
 use scene_core::technique::{ShadowQuery, TechniqueFactory};
-use scene_core::{Camera, GBuffer, Light, Scene, TriangleMesh, VisibilityImage, raster, scenes};
+use scene_core::{Camera, GBuffer, Light, Scene, TriangleMesh, VisibilityImage, metrics, raster, scenes};
 
 const CAMERA: Camera = Camera {
     eye: Vec3::new(0.0, 2.0, 4.0),
@@ -100,4 +102,58 @@ fn the_map_may_be_small() {
     // A vertex is snapped to the map's own steps; a pixel so close to an outline may differ.
     let differ = small.iter().zip(&large).filter(|(a, b)| a.to_bits() != b.to_bits() && !a.is_nan()).count();
     assert!(differ * 200 < small.len(), "{differ} of {} pixels differ", small.len());
+}
+
+/// A scene that lies 10,000 of its sizes from zero, its vertices rounded to steps of a quarter pixel, is shaded by every variant
+/// as at zero but for shadows' borders that move by half a pixel at most: V of a pixel then changes by half of what its neighbours differ
+/// from it.
+#[test]
+fn far_from_zero_shadows_stay() {
+    const SIZE: [usize; 2] = [96, 72];
+    let near = scenes::build("chess", 0.0).expect("built in");
+    let offset = Vec3::new(1.0, 0.5, -1.0) * (1e4 * near.scene.bounds().diagonal());
+    // rmse of each variant, and that of a truth whose borders are moved.
+    let errors = |offset: Vec3| {
+        let scene = near.scene.counted_from(-offset);
+        let light = match near.lights[0] {
+            Light::Spot { position, direction, outer, inner } => {
+                Light::Spot { position: position + offset, direction, outer, inner }
+            }
+            light => light,
+        };
+        let (eye, target) = (near.camera.eye + offset, near.camera.target + offset);
+        let camera = Camera { eye, target, ..near.camera.with_size(SIZE[0] as u32, SIZE[1] as u32) };
+        let gbuffer = raster::render_gbuffer(&scene, &camera);
+        let casters = Bvh::casters(&scene);
+        let settings = ReferenceSettings { samples: 1, ..Default::default() };
+        let truth = reference::reference(&scene, &casters, &light, &gbuffer, &settings, &no_progress)
+            .expect("valid")
+            .visibility;
+        let valid = reference::valid_pixels(&gbuffer, &light);
+        let mut moved = truth.clone();
+        for (pixel, v) in moved.values.iter_mut().enumerate().filter(|(pixel, _)| valid[*pixel]) {
+            let (x, y) = (pixel % SIZE[0], pixel / SIZE[0]);
+            let columns = [x.saturating_sub(1), (x + 1).min(SIZE[0] - 1)].map(|x| y * SIZE[0] + x);
+            let rows = [y.saturating_sub(1), (y + 1).min(SIZE[1] - 1)].map(|y| y * SIZE[0] + x);
+            let around = columns.into_iter().chain(rows).filter(|&beside| valid[beside]);
+            let differ = around.map(|beside| (truth.values[beside] - truth.values[pixel]).abs());
+            *v += 0.5 * differ.fold(0.0, f32::max);
+        }
+        let rmse = |image: &VisibilityImage| metrics::errors(image, &truth, &valid).expect("same size").rmse;
+        let of_variants = Variant::ALL.map(|variant| {
+            let technique = Ddoc::new(DdocParams { variant, ..Default::default() });
+            let (prepared, _) = technique.prepare(&scene, &light).expect("few triangles");
+            let mut image = VisibilityImage::new(gbuffer.width, gbuffer.height);
+            prepared.shade(&gbuffer, &mut image);
+            rmse(&image)
+        });
+        (of_variants, rmse(&moved))
+    };
+    let ((here, _), (there, moved)) = (errors(Vec3::ZERO), errors(offset));
+    for ((here, there), variant) in here.iter().zip(there).zip(Variant::ALL) {
+        assert!(
+            there < here + moved,
+            "{variant:?}: {there} where it is {here} at zero, {moved} by half a pixel"
+        );
+    }
 }

@@ -22,7 +22,7 @@ use scene_core::gpu::{
     SceneGroups, VisibilityPass, VisibilityPassParts, binding, storage_buffer,
 };
 use scene_core::technique::{Params as _, TechniqueError};
-use scene_core::{Camera, Report};
+use scene_core::{Camera, Origin, Report};
 
 use crate::params::Variant;
 use crate::{Ddoc, DdocParams, cpu};
@@ -32,9 +32,12 @@ use layout::{MOST_VIEWS, Tables};
 /// image is worse than none. What takes turns beside edges and faces is far less than the rest.
 const MOST_TURNS: u32 = 60_000;
 
-/// Edges that the shader looks at, edges that it counts and faces that it asks in a turn.
+/// Edges that the shader looks at, edges that it counts and faces that it asks in a turn; edges that it keeps until they are
+/// counted, a turn around both; edges in a turn of the variants that keep one.
 const LOOKED_AT_ONCE: u32 = 16;
-const COUNTED_AT_ONCE: u32 = 4;
+const COUNTED_AT_ONCE: u32 = 8;
+const KEPT: u32 = 64;
+const OUTER_AT_ONCE: u32 = 8;
 const FACES_AT_ONCE: u32 = 4;
 
 /// Points of the light that the shader counts at once, `VECTORS` of four.
@@ -126,7 +129,8 @@ impl DdocOnGpu {
         })?;
         let (prepared, mut report) = self
             .technique
-            .prepare_with(geometry, query.light, true)
+            // Receivers come from the G-buffer pass in world space.
+            .prepare_with(Origin::WORLD, geometry, query.light, true)
             .map_err(|error| TechniqueError::Other(Box::new(error)))?;
         GpuError::within("views of a light", prepared.layers.len() as u32, MOST_VIEWS as u32)?;
         let splats = report.time("prepare.splat", |report| {
@@ -141,8 +145,8 @@ impl DdocOnGpu {
             // At worst every edge that is looked at is counted.
             let edges = splats.longest();
             let turns = match prepared.variant {
-                Variant::Smoothies | Variant::PenumbraMap => edges,
-                _ => (edges / LOOKED_AT_ONCE + edges / COUNTED_AT_ONCE).saturating_mul(rounds),
+                Variant::Smoothies | Variant::PenumbraMap => edges / OUTER_AT_ONCE,
+                _ => (edges / LOOKED_AT_ONCE + edges / COUNTED_AT_ONCE + edges / KEPT).saturating_mul(rounds),
             };
             let turns = turns.saturating_add(faces.lists().longest() / FACES_AT_ONCE);
             GpuError::within("turns for edges and faces over one tile", turns, MOST_TURNS)?;
