@@ -107,6 +107,23 @@ fn every_built_in_scene() {
     }
 }
 
+/// Lights that see all of a street at once: tens of thousands of edges and faces over one tile end no loop early.
+#[test]
+fn many_edges_and_faces_over_one_tile() {
+    let Some(gpu) = testing::gpu() else { return };
+    let setup = scenes::build("street", 0.0).unwrap();
+    let (scene, camera) = (&setup.scene, &setup.camera.with_size(96, 72));
+    let on_face = scene.corners(scene.triangles().len() / 2).iter().sum::<Vec3>() / 3.0;
+    let radius = 0.02 * scene.bounds().diagonal();
+    for light in [
+        Light::Directional { direction: -camera.forward(), angular_radius: 0.01 },
+        Light::Sphere { center: on_face, radius },
+    ] {
+        let params = DdocParams { variant: Variant::Smoothies, ..Default::default() };
+        check(&gpu, &Case { name: "street", scene, camera, light, params });
+    }
+}
+
 /// Every light, from inside the scene, too, where maps are the faces of a cube; every variant that has a GPU path; masks.
 #[test]
 fn every_light_and_variant() {

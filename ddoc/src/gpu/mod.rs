@@ -32,11 +32,10 @@ use layout::{MOST_VIEWS, Tables};
 /// image is worse than none. What takes turns beside edges and faces is far less than the rest.
 const MOST_TURNS: u32 = 60_000;
 
-/// Edges that the shader looks at, edges that it counts and faces that it asks in a turn; edges that it keeps until they are
-/// counted, a turn around both; edges in a turn of the variants that keep one.
+/// Edges that the shader looks at, edges that it counts and faces that it asks in a turn; edges in a turn of the variants that
+/// keep one.
 const LOOKED_AT_ONCE: u32 = 16;
 const COUNTED_AT_ONCE: u32 = 8;
-const KEPT: u32 = 64;
 const OUTER_AT_ONCE: u32 = 8;
 const FACES_AT_ONCE: u32 = 4;
 
@@ -142,11 +141,12 @@ impl DdocOnGpu {
         });
         let rounds = (prepared.points.len() as u32).div_ceil(POINTS_AT_ONCE);
         for (splats, faces) in splats.iter().zip(&prepared.faces) {
-            // At worst every edge that is looked at is counted.
+            // At worst every edge that is looked at is counted; and pixels that are drawn side by side wait for one another between
+            // looking and counting, which takes turns, too.
             let edges = splats.longest();
             let turns = match prepared.variant {
                 Variant::Smoothies | Variant::PenumbraMap => edges / OUTER_AT_ONCE,
-                _ => (edges / LOOKED_AT_ONCE + edges / COUNTED_AT_ONCE + edges / KEPT).saturating_mul(rounds),
+                _ => (edges / LOOKED_AT_ONCE + 2 * (edges / COUNTED_AT_ONCE)).saturating_mul(rounds),
             };
             let turns = turns.saturating_add(faces.lists().longest() / FACES_AT_ONCE);
             GpuError::within("turns for edges and faces over one tile", turns, MOST_TURNS)?;
