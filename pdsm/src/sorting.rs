@@ -2,7 +2,7 @@
 //!
 //! Neighbouring rays pass much the same, so that sixteen of them have about as many events each. They are kept as rows of
 //! sixteen, the n-th of each pixel in row n, and a network of comparisons (Batcher's odd-even mergesort) sorts whole rows
-//! at once, without a branch. What a pixel has less than the longest of its group is filled with [`NOTHING`], which sorts
+//! at once, without a branch. What a pixel has less than the longest of its group is filled with `NOTHING`, which sorts
 //! behind everything.
 
 use bytemuck::{Pod, Zeroable};
