@@ -141,8 +141,8 @@ impl DdocOnGpu {
         });
         let rounds = (prepared.points.len() as u32).div_ceil(POINTS_AT_ONCE);
         for (splats, faces) in splats.iter().zip(&prepared.faces) {
-            // At worst every edge that is looked at is counted; and pixels that are drawn side by side wait for one another between
-            // looking and counting, which takes turns, too.
+            // At worst every edge that is looked at is counted. Counting is taken for twice its turns: where a trial came nearer to
+            // the limit pixels were wrong, and why is not known.
             let edges = splats.longest();
             let turns = match prepared.variant {
                 Variant::Smoothies | Variant::PenumbraMap => edges / OUTER_AT_ONCE,
