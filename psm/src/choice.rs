@@ -86,7 +86,7 @@ impl Situation<'_> {
                 let warp = fitted::least(
                     &self.image.warp,
                     &self.window(&self.image.warp),
-                    &self.spread(),
+                    &self.spread().collect::<Vec<_>>(),
                     self.near_shadows,
                 );
                 let fitted = warp.map(|warp| (Parametrisation::Fitted, warp));
@@ -97,14 +97,13 @@ impl Situation<'_> {
     }
 
     /// All receivers that are known by place.
-    fn spread(&self) -> Vec<DVec3> {
-        self.samples.iter().map(|s| s.point).chain(self.receivers.iter().copied()).collect()
+    fn spread(&self) -> impl Iterator<Item = DVec3> {
+        self.samples.iter().map(|s| s.point).chain(self.receivers.iter().copied())
     }
 
     /// Their window.
     fn window(&self, warp: &Warp) -> Window {
-        let points = self.spread();
-        points.iter().fold(Window::EMPTY, |window, &point| window.with(warp.place(point))).widened()
+        self.spread().fold(Window::EMPTY, |window, point| window.with(warp.place(point))).widened()
     }
 
     /// A warp, measured in the window that these receivers would give it.
