@@ -8,20 +8,10 @@ use gnomon_penumbra_wedges::exact::Work;
 use gnomon_penumbra_wedges::receiver::{Asked, Receiver};
 use gnomon_penumbra_wedges::{Casters, Factory, PenumbraWedges, Variant, WedgeParams};
 use scene_core::geometry::{AlphaMask, ObjectFlags, Wrap};
+use scene_core::technique::conformance::{self, CAMERA};
 use scene_core::technique::{ShadowQuery, TechniqueError, TechniqueFactory};
-use scene_core::{Camera, GBuffer, Light, Scene, TriangleMesh, VisibilityImage, raster};
+use scene_core::{Camera, Light, Scene, TriangleMesh, VisibilityImage, raster};
 use truth::{cube, scene_of, sheet};
-
-const CAMERA: Camera = Camera {
-    eye: Vec3::new(0.0, 2.0, 4.0),
-    target: Vec3::ZERO,
-    up: Vec3::Y,
-    fov_y: 0.8,
-    near: 0.01,
-    far: 100.0,
-    width: 33,
-    height: 17,
-};
 
 const VARIANTS: [Variant; 3] = [Variant::Interpolated, Variant::Coverage, Variant::Exact];
 
@@ -38,8 +28,8 @@ const LIGHTS: [Light; 9] = [
     Light::Spot { position: Vec3::Y, direction: Vec3::NEG_Y, outer: 1.57, inner: 0.1 },
 ];
 
-fn triangle(corners: [Vec3; 3]) -> Scene {
-    scene_of(&[TriangleMesh::new("t", corners.to_vec(), vec![[0, 1, 2]])])
+fn of(variant: Variant) -> PenumbraWedges {
+    PenumbraWedges::new(WedgeParams { variant, views: 32, rays: false, ..Default::default() })
 }
 
 /// All variants' images: a number in [0, 1] wherever a surface is seen.
@@ -47,9 +37,7 @@ fn check(scene: &Scene, light: &Light, camera: &Camera, what: &str) {
     let gbuffer = raster::render_gbuffer(scene, camera);
     let casters = Casters::new(scene).expect("edges");
     for variant in VARIANTS {
-        let technique =
-            PenumbraWedges::new(WedgeParams { variant, views: 32, rays: false, ..Default::default() });
-        let (prepared, _) = technique.prepare(&casters, light, camera).expect("no masks");
+        let (prepared, _) = of(variant).prepare(&casters, light, camera).expect("no masks");
         let mut visibility = VisibilityImage::new(camera.width, camera.height);
         prepared.shade(&gbuffer, &mut visibility);
         for (pixel, &v) in visibility.values.iter().enumerate() {
@@ -62,24 +50,17 @@ fn check(scene: &Scene, light: &Light, camera: &Camera, what: &str) {
     }
 }
 
-fn scenes_without_area() -> [Scene; 6] {
-    let x = Vec3::X;
-    [
-        Scene::new(),
-        triangle([Vec3::ZERO, x, Vec3::Z]),
-        triangle([Vec3::ZERO; 3]),
-        triangle([Vec3::ZERO, x, x * 2.0]),
-        triangle([x * 1e30, Vec3::Z * 1e30, -x * 1e30]),
-        triangle([x * 1e-30, Vec3::Z * 1e-30, -x * 1e-30]),
-    ]
+#[test]
+fn every_scene_and_light_is_answered() {
+    for variant in VARIANTS {
+        conformance::assert_answers(&of(variant));
+    }
 }
 
 #[test]
-fn scenes_without_area_are_answered() {
-    for light in &LIGHTS {
-        for scene in scenes_without_area() {
-            check(&scene, light, &CAMERA, "one triangle");
-        }
+fn buffers_of_the_wrong_size_are_refused() {
+    for variant in VARIANTS {
+        conformance::assert_refuses_wrong_sizes(&of(variant));
     }
 }
 
@@ -138,7 +119,7 @@ fn the_gpu_answers_as_well() {
 
     let Some(gpu) = testing::gpu() else { return };
     let cases =
-        scenes_without_area().into_iter().map(|scene| (scene, CAMERA, LIGHTS)).chain(SCALES.map(stress_list));
+        conformance::scenes().into_iter().map(|scene| (scene, CAMERA, LIGHTS)).chain(SCALES.map(stress_list));
     let mut on_gpu = VARIANTS.map(|variant| {
         let params = WedgeParams { variant, views: 32, rays: false, ..Default::default() };
         PenumbraWedgesOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT)
@@ -235,7 +216,7 @@ fn free_points_are_answered_and_those_that_are_not_finite_stay_unknown() {
 }
 
 #[test]
-fn masked_casters_and_wrong_sizes_are_refused() {
+fn masked_casters_are_refused() {
     let mut mesh = TriangleMesh::new("leaf", vec![Vec3::ZERO, Vec3::X, Vec3::Z], vec![[0, 1, 2]]);
     mesh.uvs = vec![Vec2::ZERO, Vec2::X, Vec2::Y];
     mesh.alpha = AlphaMask::from_alpha(2, 1, &[0, 255], 0.5, [Wrap::Repeat; 2]).map(Into::into);
@@ -246,10 +227,4 @@ fn masked_casters_and_wrong_sizes_are_refused() {
         let refused = matches!(technique.prepare(&query), Err(TechniqueError::Unsupported { .. }));
         assert_eq!(refused, !is_taken, "{preset}");
     }
-    let scene = triangle([Vec3::ZERO, Vec3::X, Vec3::Z]);
-    let technique = Factory.create(None, &[]).expect("defaults");
-    let query = ShadowQuery { scene: &scene, ..query };
-    let (prepared, _) = technique.prepare(&query).expect("supported");
-    assert!(prepared.shade(&GBuffer::new(4, 4), &mut VisibilityImage::new(3, 3)).is_err());
-    assert!(prepared.visibility_at(&[Vec3::ZERO], &mut []).is_err());
 }

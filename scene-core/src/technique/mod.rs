@@ -4,6 +4,7 @@
 //! The algorithms themselves live on concrete types in the technique crates and can be called without it.
 
 mod capability;
+pub mod conformance;
 mod factory;
 mod settings;
 
