@@ -10,8 +10,8 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
-use scene_core::Scene;
 use scene_core::geometry::Object;
+use scene_core::{Scene, splitmix};
 
 /// Faces that are summed by one task.
 const RUN: usize = 4096;
@@ -34,24 +34,16 @@ pub fn is_solid(scene: &Scene, object: &Object) -> bool {
 /// A number for a place; zeros of both signs are one place.
 fn name(place: Vec3) -> u64 {
     let [x, y, z] = (place + Vec3::ZERO).to_array().map(|at| u64::from(at.to_bits()));
-    mixed(mixed(x << 32 | y) ^ z)
+    splitmix::hash(splitmix::hash(x << 32 | y) ^ z)
 }
 
 /// A number for a directed edge: that of its reverse, negated.
 fn edge(from: u64, to: u64) -> u64 {
     match from.cmp(&to) {
-        std::cmp::Ordering::Less => mixed(from ^ to.rotate_left(32)),
+        std::cmp::Ordering::Less => splitmix::hash(from ^ to.rotate_left(32)),
         std::cmp::Ordering::Equal => 0,
-        std::cmp::Ordering::Greater => mixed(to ^ from.rotate_left(32)).wrapping_neg(),
+        std::cmp::Ordering::Greater => splitmix::hash(to ^ from.rotate_left(32)).wrapping_neg(),
     }
-}
-
-/// The finisher of splitmix64.
-fn mixed(mut word: u64) -> u64 {
-    word = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    word = (word ^ word >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    word = (word ^ word >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    word ^ word >> 31
 }
 
 #[cfg(test)]

@@ -17,7 +17,8 @@
 //! | [`relevance`] | what light and camera make irrelevant |
 //! | [`metrics`] | errors of a visibility image |
 //! | [`origin`] | coordinates counted from the scene, where it lies far from zero |
-//! | [`technique`] | the [`ShadowTechnique`] trait, settings, reports |
+//! | [`technique`] | the [`ShadowTechnique`] trait, settings, reports, what every technique's tests check |
+//! | [`splitmix`] | numbers that look random, and hashes |
 //! | `gpu` | its GPU half, with the feature of that name |
 //!
 //! # Conventions
@@ -43,6 +44,7 @@ pub mod relevance;
 pub mod report;
 pub mod scenes;
 pub mod setup;
+pub mod splitmix;
 pub mod technique;
 pub mod visibility;
 

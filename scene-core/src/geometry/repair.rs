@@ -7,6 +7,7 @@
 use glam::Vec3;
 
 use super::TriangleMesh;
+use crate::splitmix;
 
 /// How many faces were removed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -77,7 +78,9 @@ fn is_degenerate([a, b, c]: [Vec3; 3]) -> bool {
 fn remove_duplicates(mesh: &mut TriangleMesh) -> usize {
     let vertex_hashes: Vec<u64> = mesh.positions.iter().map(|p| hash_position(*p)).collect();
     // A sum does not depend on which corner comes first.
-    let hash = |t: &[u32; 3]| mix(t.iter().fold(0u64, |sum, &i| sum.wrapping_add(vertex_hashes[i as usize])));
+    let hash = |t: &[u32; 3]| {
+        splitmix::hash(t.iter().fold(0u64, |sum, &i| sum.wrapping_add(vertex_hashes[i as usize])))
+    };
     let slots = (mesh.triangles.len() * 16).next_power_of_two().max(64);
     let slot = |hash: u64| ((hash as usize & (slots - 1)) / 64, 1u64 << (hash & 63));
     let (mut seen, mut again) = (vec![0u64; slots / 64], vec![0u64; slots / 64]);
@@ -173,15 +176,7 @@ fn position_bits(position: Vec3) -> [u32; 3] {
 
 fn hash_position(position: Vec3) -> u64 {
     let [x, y, z] = position_bits(position).map(u64::from);
-    mix(mix(x | y << 32).wrapping_add(z))
-}
-
-/// The finaliser of `SplitMix64`: every input bit reaches every output bit.
-fn mix(mut x: u64) -> u64 {
-    x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ x >> 31
+    splitmix::hash(splitmix::hash(x | y << 32).wrapping_add(z))
 }
 
 #[cfg(test)]

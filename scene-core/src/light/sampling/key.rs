@@ -2,12 +2,11 @@
 
 use glam::Vec2;
 
+use crate::splitmix::{GOLDEN, hash, mix};
+
 /// What the random numbers of one pixel are drawn from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleKey(u64);
-
-/// 2⁶⁴ divided by the golden ratio, odd: successive multiples fill the ring of 64-bit numbers evenly.
-const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// The largest f32 below 1.
 pub(super) const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
@@ -16,7 +15,7 @@ impl SampleKey {
     /// The key of a pixel (or of any other thing that is counted) under a seed.
     #[inline]
     pub fn new(seed: u64, pixel: u64) -> Self {
-        Self(mix(mix(seed.wrapping_add(GOLDEN)) ^ pixel.wrapping_mul(GOLDEN)))
+        Self(mix(hash(seed) ^ pixel.wrapping_mul(GOLDEN)))
     }
 
     /// 64 random bits, the same for the same index.
@@ -37,15 +36,6 @@ impl SampleKey {
 #[inline]
 pub(super) fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
-}
-
-/// The finaliser of `SplitMix64` (Steele, Lea, Flood: Fast splittable pseudorandom number generators, 2014): each
-/// bit of the input changes each bit of the output with probability one half.
-#[inline]
-fn mix(mut z: u64) -> u64 {
-    z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ z >> 31
 }
 
 #[cfg(test)]
