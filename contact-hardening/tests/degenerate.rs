@@ -69,3 +69,13 @@ fn far_from_zero_shadows_stay() {
         assert!(error.there <= 1.5 * error.here, "{}: {error:?}", technique.source_name());
     }
 }
+
+/// The G-buffer of a GPU holds a distance, from which positions follow along the ray of a pixel's centre: they lie beside the rounded ones
+/// that the truth is asked at, half a pixel at most.
+#[cfg(feature = "gpu")]
+#[test]
+fn far_from_zero_shadows_stay_on_the_gpu() {
+    let Some(gpu) = scene_core::gpu::testing::gpu() else { return };
+    let error = conformance::far_from_zero_on(&gpu, &ContactHardening::default());
+    assert!(error.there < error.here + error.moved, "{error:?}");
+}

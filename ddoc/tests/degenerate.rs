@@ -57,3 +57,12 @@ fn far_from_zero_shadows_stay() {
         assert!(error.there < error.here + error.moved, "{variant:?}: {error:?}");
     }
 }
+
+/// A G-buffer of the GPU's holds a distance, from which positions follow along the ray of a pixel's centre.
+#[cfg(feature = "gpu")]
+#[test]
+fn far_from_zero_shadows_stay_on_the_gpu() {
+    let Some(gpu) = scene_core::gpu::testing::gpu() else { return };
+    let error = conformance::far_from_zero_on(&gpu, &Ddoc::default());
+    assert!(error.there < error.here + error.moved, "{error:?}");
+}

@@ -48,3 +48,13 @@ fn threads_leave_no_trace() {
     assert!(!one.nodes().is_empty());
     assert_eq!(one, build(3));
 }
+
+/// Built on the CPU and looked up on the GPU, far from zero as near it, but for borders that move by half a pixel at most.
+#[cfg(feature = "gpu")]
+#[test]
+fn far_from_zero_shadows_stay_on_the_gpu() {
+    let Some(gpu) = scene_core::gpu::testing::gpu() else { return };
+    let technique = Pdsm::new(PdsmParams { map_size: 256, pdsm_size: 256, ..PARAMS });
+    let error = conformance::far_from_zero_on(&gpu, &technique);
+    assert!(error.there < error.here + error.moved, "{error:?}");
+}

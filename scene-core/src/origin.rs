@@ -12,7 +12,7 @@ use std::borrow::Cow;
 
 use glam::Vec3;
 
-use crate::bvh::shadow_origin;
+use crate::bvh::{LIFT, shadow_origin};
 use crate::geometry::Aabb;
 use crate::{Camera, GBuffer, Light, Scene};
 
@@ -91,6 +91,19 @@ impl Origin {
             *position = self.point(shadow_origin(*position, normal, self.magnitude));
         }
         Cow::Owned(moved)
+    }
+
+    /// By how much positions are lifted off their surfaces, in scene units: as [shadow rays](shadow_origin) are that start
+    /// within the scene; 0 where nothing moves.
+    pub fn lift(self) -> f32 {
+        self.magnitude * LIFT
+    }
+
+    /// A G-buffer counted from here, in world space again.
+    #[must_use]
+    pub fn back(self, mut gbuffer: GBuffer) -> GBuffer {
+        gbuffer.position.iter_mut().for_each(|position| *position += self.place);
+        gbuffer
     }
 }
 

@@ -353,6 +353,7 @@ pub(crate) fn render() -> Result<image::RgbaImage, Box<dyn Error>> {
         depth: &targets.depth,
         surface: &targets.surface,
         object: &targets.object,
+        lift: 0.0,
     };
     shadows.shade(&mut recorder, &CAMERA, &gbuffer, &targets.visibility)?;
 

@@ -39,6 +39,7 @@ use walk::Cutout;
 
 pub use blocks::{blocks, blocks_cut_out};
 pub use cover::{Cover, LastCover, OUTLINE};
+pub(crate) use offset::LIFT;
 pub use offset::shadow_origin;
 pub use region::HalfSpace;
 

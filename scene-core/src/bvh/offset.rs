@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 /// 2⁻²¹, the share of the largest coordinate by which a shadow ray's origin is lifted: see [`shadow_origin`].
-const LIFT: f32 = 1.0 / (1_u32 << 21) as f32;
+pub(crate) const LIFT: f32 = 1.0 / (1_u32 << 21) as f32;
 
 /// The origin of a shadow ray from the surface at `position`: lifted along `normal_to_camera`, the unit normal
 /// on the side that is seen, by 2⁻²¹ of the largest coordinate involved.

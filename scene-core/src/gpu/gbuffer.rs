@@ -28,6 +28,10 @@ pub struct GpuGBuffer<'a> {
     pub surface: &'a wgpu::TextureView,
     /// `R32Uint`: object id; [`GBuffer::NOTHING`] where nothing is seen.
     pub object: &'a wgpu::TextureView,
+    /// How far surfaces are lifted along their normals before they are asked, in scene units: what the roundings of coordinates
+    /// may have put them below ([`Origin::lift`](crate::Origin::lift)). Techniques need none; 0 unless coordinates
+    /// were rounded far from zero and then counted from elsewhere.
+    pub lift: f32,
 }
 
 /// Textures for [`GBufferPass`], with usages to render to, to bind and to read back.
@@ -112,7 +116,7 @@ impl GBufferTargets {
     /// What techniques are given.
     pub fn view(&self) -> GpuGBuffer<'_> {
         let [depth, surface, object, _] = &self.views;
-        GpuGBuffer { size: [self.surface.width(), self.surface.height()], depth, surface, object }
+        GpuGBuffer { size: [self.surface.width(), self.surface.height()], depth, surface, object, lift: 0.0 }
     }
 }
 

@@ -1,16 +1,20 @@
 //! Whole frames without a window: G-buffer, prepare, shade, read back. For the command line, tests and benchmarks.
+//!
+//! A scene that lies far from zero is uploaded in coordinates counted [from its middle](Origin), and camera, light and G-buffer
+//! follow: no technique need know. What is given and returned is in world space.
 
+use std::borrow::Cow;
 use std::time::Instant;
 
 use thiserror::Error;
 
 use super::{
-    GBufferPass, GBufferTargets, Gpu, GpuError, GpuShadowQuery, GpuShadowTechnique, Recorder, SceneBuffers,
-    StageTimer,
+    GBufferPass, GBufferTargets, Gpu, GpuError, GpuGBuffer, GpuShadowQuery, GpuShadowTechnique, Recorder,
+    SceneBuffers, StageTimer,
 };
 use crate::report::GpuUse;
 use crate::technique::{ShadowQuery, ShadowTechnique, TechniqueError};
-use crate::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
+use crate::{Camera, GBuffer, Light, Origin, Report, Scene, VisibilityImage};
 
 /// The format that headless frames are shaded in.
 pub const VISIBILITY_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
@@ -59,8 +63,10 @@ pub struct HeadlessRun {
 #[derive(Debug)]
 pub struct HeadlessView<'a> {
     gpu: &'a Gpu,
-    scene: &'a Scene,
-    camera: &'a Camera,
+    origin: Origin,
+    /// Both counted from there.
+    scene: Cow<'a, Scene>,
+    camera: Camera,
     buffers: SceneBuffers,
     /// Made when it is first drawn.
     pass: Option<GBufferPass>,
@@ -94,7 +100,9 @@ impl Gpu {
     pub fn view<'a>(&'a self, scene: &'a Scene, camera: &'a Camera) -> Result<HeadlessView<'a>, GpuError> {
         let limit = self.device.limits().max_texture_dimension_2d;
         GpuError::within("pixels a row or rows", camera.width.max(camera.height), limit)?;
-        let buffers = self.scoped("the scene", || SceneBuffers::new(&self.device, scene))??;
+        let origin = Origin::near(scene.bounds());
+        let (scene, camera) = (origin.scene(scene), origin.camera(camera));
+        let buffers = self.scoped("the scene", || SceneBuffers::new(&self.device, &scene))??;
         let targets =
             self.scoped("the G-buffer", || GBufferTargets::new(&self.device, camera.width, camera.height))?;
         let visibility = self.scoped("the visibility texture", || self.visibility_texture(&targets))?;
@@ -102,7 +110,7 @@ impl Gpu {
             true => Some(StageTimer::on_the_wall()),
             false => StageTimer::new(&self.device, &self.queue, TIMED_PASSES),
         };
-        Ok(HeadlessView { gpu: self, scene, camera, buffers, pass: None, targets, visibility, timer })
+        Ok(HeadlessView { gpu: self, origin, scene, camera, buffers, pass: None, targets, visibility, timer })
     }
 
     fn visibility_texture(&self, targets: &GBufferTargets) -> wgpu::Texture {
@@ -127,14 +135,14 @@ impl HeadlessView<'_> {
     /// # Errors
     /// What the device objects to.
     pub fn draw_gbuffer(&mut self) -> Result<(GBuffer, Report), HeadlessError> {
-        let Self { gpu, scene, camera, buffers, pass, targets, timer, .. } = self;
+        let Self { gpu, origin, scene, camera, buffers, pass, targets, timer, .. } = self;
         let (report, _) = gpu.step(timer, "gbuffer", |recorder| {
             let scene = buffers.view(Some(scene));
             pass.get_or_insert_with(|| GBufferPass::new(&gpu.device))
                 .record(recorder, "gbuffer", &scene, camera, targets);
             Ok(Report::default())
         })?;
-        Ok((gpu.read_gbuffer(targets, camera)?, report))
+        Ok((origin.back(gpu.read_gbuffer(targets, camera)?), report))
     }
 
     /// Takes a G-buffer of the camera's size instead, so that both backends are asked about the same surfaces.
@@ -167,13 +175,15 @@ impl HeadlessView<'_> {
         light: &Light,
         gbuffer: &GBuffer,
     ) -> Result<HeadlessRun, HeadlessError> {
-        let Self { gpu, scene, camera, buffers, targets, visibility, timer, .. } = self;
+        let Self { gpu, origin, scene, camera, buffers, targets, visibility, timer, .. } = self;
+        let light = &origin.light(light);
         let query = GpuShadowQuery { scene: buffers.view(Some(scene)), light, camera };
         let (mut report, prepare_ms) =
             gpu.step(timer, "prepare.wall", |recorder| technique.prepare(recorder, &query))?;
         let view = visibility.create_view(&Default::default());
         let (shaded, shade_ms) = gpu.step(timer, "shade.wall", |recorder| {
-            technique.shade(recorder, camera, &targets.view(), &view)
+            let gbuffer = GpuGBuffer { lift: origin.lift(), ..targets.view() };
+            technique.shade(recorder, camera, &gbuffer, &view)
         })?;
         report.merge(&shaded);
         report.gpu = Some(GpuUse { adapter: gpu.adapter_name(), features: gpu.features() });

@@ -32,6 +32,10 @@ pub struct CameraUniform {
     pub size: Vec2,
     /// depth = x + y / view depth.
     pub depth_scale: Vec2,
+    /// How far seen surfaces are lifted along their normals ([`GpuGBuffer::lift`](super::GpuGBuffer::lift)).
+    pub lift: f32,
+    /// Fills the last row.
+    pub padding: [f32; 3],
 }
 
 impl CameraUniform {
@@ -53,6 +57,8 @@ impl CameraUniform {
             size: Vec2::new(camera.width as f32, camera.height as f32),
             // depth = (a·z + b) / −z with z = −view depth.
             depth_scale: Vec2::new(-projection.z_axis.z, projection.w_axis.z),
+            lift: 0.0,
+            padding: [0.0; 3],
         }
     }
 }
@@ -156,7 +162,7 @@ mod tests {
             CameraUniform,
             shader("camera"),
             "Camera",
-            [clip_from_relative, right, tan_x, up, tan_y, forward, near, eye, far, size, depth_scale]
+            [clip_from_relative, right, tan_x, up, tan_y, forward, near, eye, far, size, depth_scale, lift]
         );
         assert_layout!(LightUniform, shader("light"), "Light", [center, kind, axis, extent, u, sine, v]);
         assert_layout!(CasterNode, shader("caster_tree"), "Node", [low, skip, high, first, count]);

@@ -50,7 +50,8 @@ impl Receivers {
         gbuffer: &GpuGBuffer<'_>,
     ) -> Option<wgpu::BindGroup> {
         let [light, unshadowed] = self.prepared.clone()?;
-        let camera = self.camera.get(device, bytemuck::bytes_of(&CameraUniform::new(camera)));
+        let camera = CameraUniform { lift: gbuffer.lift, ..CameraUniform::new(camera) };
+        let camera = self.camera.get(device, bytemuck::bytes_of(&camera));
         let bound: [Bound; 5] =
             [camera.into(), light.into(), gbuffer.surface.into(), gbuffer.object.into(), unshadowed.into()];
         Some(self.group.get(device, &bound))

@@ -12,7 +12,9 @@ use super::{Capability, PreparedShadow, ShadowQuery, ShadowTechnique, TechniqueE
 use crate::bvh::Bvh;
 use crate::geometry::ObjectFlags;
 use crate::reference::{self, ReferenceSettings, no_progress};
-use crate::{Camera, GBuffer, Light, Scene, TriangleMesh, VisibilityImage, metrics, raster, scenes};
+use crate::{
+    Camera, GBuffer, Light, Scene, SceneSetup, TriangleMesh, VisibilityImage, metrics, raster, scenes,
+};
 
 /// A small image that looks down at zero.
 pub const CAMERA: Camera = Camera {
@@ -169,16 +171,48 @@ pub struct FarFromZero {
 /// # Panics
 /// If the technique does not take a spot light.
 pub fn far_from_zero(technique: &dyn ShadowTechnique) -> FarFromZero {
-    let offset = |scene: &Scene| Vec3::new(1.0, 0.5, -1.0) * (1e4 * scene.bounds().diagonal());
-    let [here, _] = errors_at(technique, |_| Vec3::ZERO);
-    let [there, moved] = errors_at(technique, offset);
+    far_from_zero_by(&|query, gbuffer| {
+        let mut image = VisibilityImage::new(gbuffer.width, gbuffer.height);
+        match prepared(technique, query).shade(gbuffer, &mut image) {
+            Ok(_) => image,
+            Err(error) => panic!("{}: {error}", technique.name()),
+        }
+    })
+}
+
+/// The same on a GPU.
+///
+/// # Panics
+/// If the technique does not take a spot light there.
+#[cfg(feature = "gpu")]
+pub fn far_from_zero_on(gpu: &crate::gpu::Gpu, technique: &dyn ShadowTechnique) -> FarFromZero {
+    far_from_zero_by(&|query, gbuffer| {
+        let image = || {
+            let mut view = gpu.view(query.scene, query.camera)?;
+            view.upload_gbuffer(gbuffer)?;
+            view.run(view.technique(technique)?.as_mut(), query.light, gbuffer)
+        };
+        match image() {
+            Ok(run) => run.visibility,
+            Err(error) => panic!("{}: {error}", technique.name()),
+        }
+    })
+}
+
+fn far_from_zero_by(shade: &dyn Fn(&ShadowQuery<'_>, &GBuffer) -> VisibilityImage) -> FarFromZero {
+    let Ok(near) = scenes::build("chess", 0.0) else { panic!("chess is built in") };
+    let offset = Vec3::new(1.0, 0.5, -1.0) * (1e4 * near.scene.bounds().diagonal());
+    let [here, _] = errors_at(&near, Vec3::ZERO, shade);
+    let [there, moved] = errors_at(&near, offset, shade);
     FarFromZero { here, there, moved }
 }
 
-/// The rmse of the technique, and of a truth with moved borders.
-fn errors_at(technique: &dyn ShadowTechnique, offset: impl Fn(&Scene) -> Vec3) -> [f64; 2] {
-    let Ok(near) = scenes::build("chess", 0.0) else { panic!("chess is built in") };
-    let offset = offset(&near.scene);
+/// The rmse of what is shaded, and of a truth with moved borders.
+fn errors_at(
+    near: &SceneSetup,
+    offset: Vec3,
+    shade: &dyn Fn(&ShadowQuery<'_>, &GBuffer) -> VisibilityImage,
+) -> [f64; 2] {
     let scene = near.scene.counted_from(-offset);
     let light = match near.lights[0] {
         Light::Spot { position, direction, outer, inner } => {
@@ -195,9 +229,7 @@ fn errors_at(technique: &dyn ShadowTechnique, offset: impl Fn(&Scene) -> Vec3) -
         panic!("nothing cancels it")
     };
     let valid = reference::valid_pixels(&gbuffer, &light);
-    let prepared = prepared(technique, &ShadowQuery { scene: &scene, light: &light, camera: &camera });
-    let mut image = VisibilityImage::new(camera.width, camera.height);
-    prepared.shade(&gbuffer, &mut image).unwrap_or_else(|error| panic!("{}: {error}", technique.name()));
+    let image = shade(&ShadowQuery { scene: &scene, light: &light, camera: &camera }, &gbuffer);
     [&image, &with_moved_borders(&truth.visibility, &valid)].map(|image| {
         metrics::errors(image, &truth.visibility, &valid).unwrap_or_else(|error| panic!("{error}")).rmse
     })
