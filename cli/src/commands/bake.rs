@@ -44,6 +44,9 @@ pub(crate) fn run(args: &BakeArgs, console: &Console) -> Result<(), CliError> {
         let _working = console.working(format!("baking {}", args.scene.scene));
         Pdsm::new(params).bake(&view.setup.scene, view.light())
     };
+    if baked.is_empty() {
+        console.note("note: nothing that stands still throws a shadow, so the file is empty; what may move throws its own when it is rendered");
+    }
     let bytes = baked.to_bytes();
     scene_core::io::write::bytes(&args.out, &bytes)?;
     let report = BakeReport {

@@ -28,6 +28,15 @@ fn what_was_baked_is_rendered() {
     assert_eq!(bits(&baked), bits(&built));
 }
 
+/// The ball may move, and nothing else is before the ground.
+#[test]
+fn an_empty_file_is_told() {
+    let bench = Workbench::new();
+    let said = bench.done(&["bake", "ball", "-o", "ball.pdsm"]);
+    assert!(said.stderr.contains("nothing that stands still"), "{}", said.stderr);
+    bench.done(&render("ball.pdsm", "ball"));
+}
+
 #[test]
 fn what_does_not_fit_is_told() {
     let bench = Workbench::new();

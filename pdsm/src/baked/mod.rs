@@ -150,6 +150,11 @@ impl Baked {
         &self.light
     }
 
+    /// Whether nothing that stands still is before anything else: no function is in it.
+    pub fn is_empty(&self) -> bool {
+        self.windows.iter().all(|window| window.functions.nodes().is_empty())
+    }
+
     /// The functions, to shade `scene` with. Its dynamic casters get a PDSM of their own, made here, so that a frame in
     /// which they moved costs no more than they do.
     ///
