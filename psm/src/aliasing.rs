@@ -7,10 +7,14 @@
 //! have, is 2/π times the sum of its two sides: wrong pixels along edges grow in proportion to d.
 
 use glam::{DMat2, DVec3};
+use rayon::prelude::*;
 
 use crate::seen::Sample;
 use crate::view_frame::ViewFrame;
 use crate::warp::{Warp, Window, at};
+
+/// Samples that a task measures at least, some 10 µs: a smaller one costs more to hand over.
+const SAMPLES_A_TASK: usize = 128;
 
 /// d at a surface point with the unit normal `normal`, of a map of `map_size` texels a side. Infinite where the map or
 /// the camera sees the surface edge-on.
@@ -70,6 +74,12 @@ pub fn expected_error(warp: &Warp, window: &Window, map_size: u32, point: DVec3,
     (on_surface.x_axis.length() * texel.x + on_surface.y_axis.length() * texel.y) * 0.5
 }
 
+/// [`expected_error`] at each sample.
+pub fn expected_errors(warp: &Warp, window: &Window, map_size: u32, samples: &[Sample]) -> Vec<f64> {
+    let samples = samples.par_iter().with_min_len(SAMPLES_A_TASK);
+    samples.map(|s| expected_error(warp, window, map_size, s.point, s.normal)).collect()
+}
+
 /// d over what is seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aliasing {
@@ -89,10 +99,13 @@ impl Aliasing {
         if values.is_empty() {
             return Self::default();
         }
-        values.sort_by(f64::total_cmp);
-        let rank = |q: f64| values[((values.len() - 1) as f64 * q).round() as usize];
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        Self { mean, median: rank(0.5), p99: rank(0.99), samples: values.len() }
+        let samples = values.len();
+        let mean = values.iter().sum::<f64>() / samples as f64;
+        let mut rank = |q: f64| {
+            let index = ((samples - 1) as f64 * q).round() as usize;
+            *values.select_nth_unstable_by(index, f64::total_cmp).1
+        };
+        Self { mean, median: rank(0.5), p99: rank(0.99), samples }
     }
 }
 
@@ -104,5 +117,6 @@ pub fn of_samples(
     frame: &ViewFrame,
     samples: &[Sample],
 ) -> Vec<f64> {
-    samples.iter().map(|s| texel_in_pixels(warp, window, map_size, frame, s.point, s.normal)).collect()
+    let samples = samples.par_iter().with_min_len(SAMPLES_A_TASK);
+    samples.map(|s| texel_in_pixels(warp, window, map_size, frame, s.point, s.normal)).collect()
 }

@@ -109,8 +109,8 @@ impl Situation<'_> {
     /// A warp, measured in the window that these receivers would give it.
     fn measured(&self, parametrisation: Parametrisation, warp: Warp) -> Candidate {
         let window = self.window(&warp);
-        let error = |s: &Sample| aliasing::expected_error(&warp, &window, self.map_size, s.point, s.normal);
-        Candidate::new(parametrisation, warp, self.near_shadows.iter().map(error).collect())
+        let errors = aliasing::expected_errors(&warp, &window, self.map_size, self.near_shadows);
+        Candidate::new(parametrisation, warp, errors)
     }
 }
 

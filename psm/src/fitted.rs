@@ -115,13 +115,19 @@ struct Measure {
 /// Samples side by side.
 const LANES: usize = 8;
 
+/// After how many samples it is asked whether the others can still matter.
+const ASKED_EACH: usize = 4 * LANES;
+
 impl Measure {
     fn new(scaled: &Warp, receivers: &[DVec2], samples: &[Sample]) -> Self {
         let extreme = |index: usize| {
-            let along = |place: &DVec2| direction(index).dot(*place);
-            let farther =
-                |best: DVec2, place: &DVec2| if along(place) > along(&best) { *place } else { best };
-            receivers.iter().skip(1).fold(receivers[0], farther).as_vec2()
+            let along = direction(index);
+            let farther = |best: (f64, DVec2), place: &DVec2| {
+                let reach = along.dot(*place);
+                if reach > best.0 { (reach, *place) } else { best }
+            };
+            let first = (along.dot(receivers[0]), receivers[0]);
+            receivers.iter().skip(1).fold(first, farther).1.as_vec2()
         };
         let mut measure = Self {
             extremes: std::array::from_fn(extreme),
@@ -151,7 +157,14 @@ impl Measure {
     }
 
     /// The sum over the samples, up to a factor that all shapes have; infinite for one that has no w above 0 or no extent.
-    fn of(&self, [a, b, p, q]: Shape) -> f32 {
+    #[cfg(test)]
+    fn of(&self, shape: Shape) -> f32 {
+        self.of_less(shape, f32::INFINITY)
+    }
+
+    /// As `of`, but infinite as soon as it is known not to be less than `limit`: no sample weighs less than nothing, and
+    /// rounded sums do not fall either.
+    fn of_less(&self, [a, b, p, q]: Shape, limit: f32) -> f32 {
         let (mut low, mut high) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
         let (mut least, mut largest) = (f32::INFINITY, 0f32);
         for place in self.extremes {
@@ -169,6 +182,9 @@ impl Measure {
         let [uu, uv, vv] = &self.metrics;
         let mut sums = [0f32; LANES];
         for start in (0..us.len()).step_by(LANES) {
+            if start % ASKED_EACH == 0 && sums.iter().sum::<f32>() > limit * determinant {
+                return f32::INFINITY;
+            }
             let lanes = |values: &[f32]| -> [f32; LANES] { std::array::from_fn(|i| values[start + i]) };
             let [u, v, uu, uv, vv] = [us, vs, uu, uv, vv].map(|values| lanes(values));
             for i in 0..LANES {
@@ -195,13 +211,13 @@ pub fn least(image: &Warp, window: &Window, receivers: &[DVec3], near_shadows: &
         return None;
     }
     let measure = Measure::new(&scaled, &places, near_shadows);
-    let mut best = ([0.0; 4], measure.of([0.0; 4]));
+    let mut best = ([0.0; 4], measure.of_less([0.0; 4], f32::INFINITY));
     let mut step = FIRST_STEP;
     for round in 0..=ROUNDS {
-        let center = best.0;
+        let (center, limit) = best;
         let shape = |index| if round == 0 { first(index) } else { around(center, step, index) };
         let indices = (0..CHOICES).into_par_iter().with_min_len(CHOICES / 4);
-        let errors: Vec<f32> = indices.map(|index| measure.of(shape(index))).collect();
+        let errors: Vec<f32> = indices.map(|index| measure.of_less(shape(index), limit)).collect();
         for (shape, error) in (0..CHOICES).map(shape).zip(errors) {
             if error < best.1 * (1.0 - SAME) {
                 best = (shape, error);

@@ -5,6 +5,8 @@
 //! measured by them. Every pixel is asked again only for the window of the one that is taken ([`Seen::fit`]), and of those only
 //! the tiles at the window's border.
 
+use std::ops::Range;
+
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use scene_core::camera::CameraRays;
@@ -20,6 +22,9 @@ const TILES: u32 = 32;
 
 /// A tile's sides in pixels are a multiple of this, the side of a workgroup.
 const STEP: u32 = 8;
+
+/// Depths that are compared side by side.
+const LANES: usize = STEP as usize;
 
 /// Below this cosine between normal and light a surface receives next to nothing; errors are not counted there
 /// ([`scene_core::reference::valid_pixels`]), nor is aliasing.
@@ -213,20 +218,41 @@ impl<'a> Wanted<'a> {
         }
     }
 
-    /// As [`look_at`](Self::look_at) where there is one image: most pixels change nothing, and are told by their depth alone.
+    /// As [`look_at`](Self::look_at) where there is one image. Mostly the nearest and the farthest surface of a tile and its middle
+    /// are receivers, and three pixels are asked; else every pixel whose depth or place could change something.
     fn look_at_one(&self, grid: TileGrid, [column, row]: [usize; 2], tile: &mut Tile) {
         let (width, height, side) = (self.gbuffer.width, self.gbuffer.height, grid.side);
         let (left, top) = (column as u32 * side, row as u32 * side);
+        let (bottom, right) = ((top + side).min(height), (left + side).min(width));
+        let span = |y: u32| (y * width + left) as usize..(y * width + right) as usize;
+        let range = depth_range((top..bottom).map(|y| &self.gbuffer.depth[span(y)]));
+        if range[0] > range[1] {
+            return;
+        }
+        let first_with = |depth: f32| {
+            let within = |row: Range<usize>| {
+                self.gbuffer.depth[row.clone()].iter().position(|&d| d == depth).map(|x| row.start + x)
+            };
+            (top..bottom).map(span).find_map(within).filter(|&pixel| self.at(pixel).is_some())
+        };
         let (mut nearest, mut farthest, mut off_middle) = (f32::INFINITY, f32::NEG_INFINITY, u32::MAX);
-        // Mostly it is the middle itself.
+        if let Some(pixel) = first_with(range[0]) {
+            (nearest, tile.nearest) = (range[0], pixel as u32);
+        }
+        if let Some(pixel) = first_with(range[1]) {
+            (farthest, tile.farthest) = (range[1], pixel as u32);
+        }
         let middle = (left + side / 2, top + side / 2);
         let pixel = middle.1 as usize * width as usize + middle.0 as usize;
         if middle.0 < width && middle.1 < height && self.at(pixel) == Some(true) {
             (off_middle, tile.sample) = (0, pixel as u32);
         }
-        for y in top..(top + side).min(height) {
-            let first = y as usize * width as usize + left as usize;
-            let depths = &self.gbuffer.depth[first..first + (width - left).min(side) as usize];
+        if [nearest, farthest] == range && off_middle == 0 {
+            return;
+        }
+        for y in top..bottom {
+            let first = span(y).start;
+            let depths = &self.gbuffer.depth[span(y)];
             let off_row = (y - top).abs_diff(side / 2);
             for (x, &depth) in (0u32..).zip(depths) {
                 let off = off_row + x.abs_diff(side / 2);
@@ -249,6 +275,25 @@ impl<'a> Wanted<'a> {
             }
         }
     }
+}
+
+/// The least and the largest finite depth of `rows`, eight side by side; the least is above the other where there is none.
+fn depth_range<'a>(rows: impl Iterator<Item = &'a [f32]>) -> [f32; 2] {
+    let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    let mut take = |lane: usize, depth: f32| {
+        // NaN is below and above nothing.
+        let finite = if depth < f32::INFINITY { depth } else { f32::NEG_INFINITY };
+        low[lane] = if depth < low[lane] { depth } else { low[lane] };
+        high[lane] = if finite > high[lane] { finite } else { high[lane] };
+    };
+    for row in rows {
+        let (eights, rest) = row.as_chunks::<LANES>();
+        for eight in eights {
+            (0..LANES).for_each(|lane| take(lane, eight[lane]));
+        }
+        rest.iter().enumerate().for_each(|(lane, &depth)| take(lane, depth));
+    }
+    [low.into_iter().fold(f32::INFINITY, f32::min), high.into_iter().fold(f32::NEG_INFINITY, f32::max)]
 }
 
 impl<'a> Seen<'a> {
@@ -326,17 +371,17 @@ impl<'a> Seen<'a> {
             }
             let place = [index % columns, index / columns];
             let corners = self.corners(place, tile);
-            if corners.iter().all(|&p| at(image.w, p) > 0.0)
-                && part.is_beside(&corners.map(|p| image.place(p)))
-            {
-                return None;
-            }
             let around = corners.into_iter().fold(nothing, with);
             let is_inside = around.1[0] > 0.0
                 && first.0.union(around.0) == first.0
                 && around.1[0] >= first.1[0]
                 && around.1[1] <= first.1[1];
-            if is_inside {
+            let is_beside = || {
+                !part.is_everywhere()
+                    && corners.iter().all(|&p| at(image.w, p) > 0.0)
+                    && part.is_beside(&corners.map(|p| image.place(p)))
+            };
+            if is_inside || is_beside() {
                 return None;
             }
             let pixels = self.wanted.pixels(self.grid, place).map(|(_, _, pixel)| pixel);
@@ -361,9 +406,10 @@ impl<'a> Seen<'a> {
         let depths = [depth(tile.nearest) * (1.0 - SLACK), depth(tile.farthest) * (1.0 + SLACK)];
         let low = glam::Vec2::new(column as f32, row as f32) * side;
         let high = (low + side).min(glam::Vec2::new(gbuffer.width as f32, gbuffer.height as f32));
-        std::array::from_fn(|i| {
-            let pixel = glam::Vec2::new([low.x, high.x][i & 1], [low.y, high.y][i >> 1 & 1]);
-            *eye + rays.direction(pixel).as_dvec3() * f64::from(depths[i >> 2])
-        })
+        let directions: [DVec3; 4] = std::array::from_fn(|i| {
+            let pixel = glam::Vec2::new([low.x, high.x][i & 1], [low.y, high.y][i >> 1]);
+            rays.direction(pixel).as_dvec3()
+        });
+        std::array::from_fn(|i| *eye + directions[i & 3] * f64::from(depths[i >> 2]))
     }
 }

@@ -123,15 +123,18 @@ pub fn map_views(
     if boxes.iter().all(Aabb::is_empty) {
         return Vec::new();
     }
-    let images =
-        report.time("prepare.images", |_| Images::new(scene, light, camera, boxes.to_vec(), params.variant));
-    let wanted = Wanted::new(scene, gbuffer, camera, light);
-    let seen = report
-        .time("prepare.receivers", |_| wanted.seen(images.images.len(), |point| images.image_of(point)));
-    let frame = ViewFrame::new(camera);
-    report.time("prepare.views", |_| {
-        let of_image = |(image, seen): (usize, &Seen<'_>)| map_view(&images, image, seen, &frame, params);
-        seen.iter().enumerate().filter_map(of_image).collect()
+    // Many short steps: from outside the pool each would wait for a thread to wake.
+    rayon::scope(|_| {
+        let images = report
+            .time("prepare.images", |_| Images::new(scene, light, camera, boxes.to_vec(), params.variant));
+        let wanted = Wanted::new(scene, gbuffer, camera, light);
+        let seen = report
+            .time("prepare.receivers", |_| wanted.seen(images.images.len(), |point| images.image_of(point)));
+        let frame = ViewFrame::new(camera);
+        report.time("prepare.views", |_| {
+            let of_image = |(image, seen): (usize, &Seen<'_>)| map_view(&images, image, seen, &frame, params);
+            seen.iter().enumerate().filter_map(of_image).collect()
+        })
     })
 }
 
@@ -196,8 +199,8 @@ fn map_view(
         [offsets.x.w, offsets.y.w, offsets.w.w].map(f64::abs).into_iter().fold(0.0, f64::max) / w[0];
     let window = window.widened().grown(rounding * f64::from(f32::EPSILON));
     let values = aliasing::of_samples(&warp, &window, params.map_size, frame, &samples);
-    let error = |s: &Sample| aliasing::expected_error(&warp, &window, params.map_size, s.point, s.normal);
-    let measure = near_shadows.iter().map(error).sum::<f64>() / near_shadows.len().max(1) as f64;
+    let errors = aliasing::expected_errors(&warp, &window, params.map_size, &near_shadows);
+    let measure = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
     let clip_from_world = warp::clip_from_world(&window.fitted(&warp), image.light, w, images.casters);
     if !clip_from_world.is_finite() {
         return None;
