@@ -15,11 +15,15 @@
 //! λ is lowered by 2⁻¹⁶·(1 + λ²) and planes are moved outwards by 2⁻¹⁷ of the largest coordinate: products of two f32 and
 //! their sums are good to 2⁻²² of their terms, here and where a receiver asks. Both terms of λ are a sum each, of terms as
 //! long as the way, which is √(1 + λ²) times as long as it goes forwards, or more: their quotient is good to
-//! 2⁻²²·(1 + |λ|)·√(1 + λ²), below 2⁻²¹·(1 + λ²).
+//! 2⁻²²·(1 + |λ|)·√(1 + λ²), below 2⁻²¹·(1 + λ²), and to 2⁻²³·|λ| more where it is a product with the inverse.
 
+use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x16};
 use glam::{Vec3, Vec4};
 use scene_core::geometry::Aabb;
 use scene_core::light::{LightHull, LightPoint};
+
+use crate::lanes::LANES;
+use crate::tile_edges::dot;
 
 /// λ is lowered by this times 1 + λ².
 const TILT: f32 = 1.0 / 65_536.0;
@@ -37,11 +41,8 @@ pub struct Beam {
 impl Beam {
     /// Over receivers in `bounds`, which is relative to `origin`. `None` where rays lead away from the light's middle, as
     /// around a receiver that stands beside its light: nothing is known of such a beam.
-    pub fn new(bounds: &Aabb, hull: &LightHull, origin: Vec3) -> Option<Self> {
-        let corners: [Vec3; 8] = std::array::from_fn(|i| {
-            let pick = |axis: usize| if i >> axis & 1 == 1 { bounds.max[axis] } else { bounds.min[axis] };
-            Vec3::new(pick(0), pick(1), pick(2))
-        });
+    #[inline(always)]
+    pub fn new<S: Simd>(simd: S, bounds: &Aabb, hull: &LightHull, origin: Vec3) -> Option<Self> {
         let middle = bounds.center();
         let lights = hull.corners();
         let way = |from: Vec3, to: LightPoint| match to {
@@ -51,29 +52,50 @@ impl Beam {
         let sum: Vec3 = lights.iter().map(|&light| way(middle, light).normalize_or_zero()).sum();
         let axis = sum.try_normalize()?;
         let [u, v] = sides(lights, axis);
-        // The least way along the axis; all ways must lead forwards.
-        let mut steepest = [f32::NEG_INFINITY; 4];
-        let directions = [u, -u, v, -v];
-        for &light in lights {
-            for corner in corners {
-                let way = way(corner, light);
-                let forwards = axis.dot(way);
-                if forwards.is_nan() || forwards <= way.length() * TILT {
-                    return None;
-                }
-                for (steepest, direction) in steepest.iter_mut().zip(directions) {
-                    *steepest = steepest.max(direction.dot(way) / forwards);
-                }
-                if matches!(light, LightPoint::Towards(_)) {
-                    break;
-                }
-            }
+        // The corners of the box, each twice; all ways must lead forwards.
+        let (mut x, mut y, mut z) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            x[i] = if i & 1 == 0 { bounds.min.x } else { bounds.max.x };
+            y[i] = if i & 2 == 0 { bounds.min.y } else { bounds.max.y };
+            z[i] = if i & 4 == 0 { bounds.min.z } else { bounds.max.z };
         }
+        let (x, y) = (f32x16::load_array_ref(simd, &x), f32x16::load_array_ref(simd, &y));
+        let z = f32x16::load_array_ref(simd, &z);
+        let (most, least) = (f32::NEG_INFINITY, f32::INFINITY);
+        let mut greatest = [f32x16::splat(simd, most), f32x16::splat(simd, most)];
+        let mut smallest = [f32x16::splat(simd, least), f32x16::splat(simd, least)];
+        for &light in lights {
+            let way = match light {
+                LightPoint::At(place) => {
+                    let place = place - origin;
+                    [place.x - x, place.y - y, place.z - z]
+                }
+                LightPoint::Towards(way) => {
+                    [f32x16::splat(simd, way.x), f32x16::splat(simd, way.y), f32x16::splat(simd, way.z)]
+                }
+            };
+            let forwards = dot(axis, way);
+            let length = (way[0] * way[0] + way[1] * way[1] + way[2] * way[2]).sqrt();
+            // NaN leads nowhere.
+            if forwards.simd_gt(length * TILT).to_bitmask() != (1 << LANES) - 1 {
+                return None;
+            }
+            let inverse = f32x16::splat(simd, 1.0) / forwards;
+            let slopes = [dot(u, way) * inverse, dot(v, way) * inverse];
+            greatest = [greatest[0].max(slopes[0]), greatest[1].max(slopes[1])];
+            smallest = [smallest[0].min(slopes[0]), smallest[1].min(slopes[1])];
+        }
+        let directions = [u, -u, v, -v];
+        let steepest = [
+            greatest[0].reduce_max(),
+            -smallest[0].reduce_min(),
+            greatest[1].reduce_max(),
+            -smallest[1].reduce_min(),
+        ];
         let largest = bounds.magnitude().max(origin.abs().max_element());
         let plane = |normal: Vec3| {
             let normal = normal.normalize();
-            let outermost =
-                corners.iter().map(|corner| normal.dot(*corner)).fold(f32::NEG_INFINITY, f32::max);
+            let outermost = normal.dot(Vec3::select(normal.cmpgt(Vec3::ZERO), bounds.max, bounds.min));
             normal.extend(-(outermost + largest * SHIFT))
         };
         let mut planes = [plane(-axis); 5];
@@ -104,6 +126,7 @@ fn sides(lights: &[LightPoint], axis: Vec3) -> [Vec3; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fearless_simd::{Level, dispatch};
     use scene_core::Light;
     use scene_core::light::sampling::{LightView, SampleKey, low_discrepancy};
 
@@ -121,7 +144,7 @@ mod tests {
         ];
         for light in lights {
             let hull = LightHull::of(&light).unwrap();
-            let beam = Beam::new(&bounds, &hull, origin).unwrap();
+            let beam = dispatch!(Level::new(), simd => Beam::new(simd, &bounds, &hull, origin)).unwrap();
             let outside = |point: Vec3| beam.planes.iter().any(|plane| plane.dot(point.extend(1.0)) > 0.0);
             let mut points = [LightPoint::At(Vec3::ZERO); 64];
             for i in 0..27 {
@@ -154,6 +177,7 @@ mod tests {
     fn around_its_light_there_is_none() {
         let hull = LightHull::of(&Light::Sphere { center: Vec3::ZERO, radius: 1.0 }).unwrap();
         let bounds = Aabb { min: Vec3::splat(-2.0), max: Vec3::splat(2.0) };
-        assert_eq!(Beam::new(&bounds, &hull, Vec3::ZERO), None);
+        let beam = dispatch!(Level::new(), simd => Beam::new(simd, &bounds, &hull, Vec3::ZERO));
+        assert_eq!(beam, None);
     }
 }

@@ -12,15 +12,16 @@
 //! of products of f32, good to 2⁻²² of their terms, are then good to 2⁻¹⁶. A sign is taken to be known beyond 2⁻¹² of the
 //! terms.
 
-use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
+use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x16};
 use glam::Vec3;
 use gnomon_shadow_map::light_maps::Receiver;
+use scene_core::Light;
 use scene_core::geometry::Aabb;
 use scene_core::light::LightPoint;
-use scene_core::{Light, Scene};
 
-use crate::chosen::{LANES, keep_lanes};
+use crate::chosen::Chosen;
 use crate::coverage::{Site, is_left};
+use crate::lanes::{Lanes, load_three};
 use crate::tile_edges::cross;
 
 /// Below this cosine between a flat light's normal and the way to it nothing is taken to be known of a block.
@@ -36,8 +37,7 @@ const PARTS: usize = 17;
 /// Faces of a block, component by component.
 #[derive(Debug, Default)]
 pub(crate) struct BlockFaces {
-    parts: [Vec<f32>; PARTS],
-    count: usize,
+    lanes: Lanes<PARTS>,
 }
 
 /// What is known of the faces over a block.
@@ -52,34 +52,42 @@ pub(crate) enum Before {
 }
 
 impl BlockFaces {
-    /// Takes over the triangles that `indices` name, and fills the last lanes.
-    pub(crate) fn gather(
+    /// Takes over triangles by their corners in world space, with the sums of `receiver_plane::is_behind`.
+    #[inline(always)]
+    pub(crate) fn gather<S: Simd>(
         &mut self,
-        scene: &Scene,
-        indices: impl Iterator<Item = u32>,
+        simd: S,
+        triangles: &Chosen<9>,
         origin: Vec3,
         center: LightPoint,
     ) {
-        self.parts.iter_mut().for_each(Vec::clear);
-        self.count = 0;
-        for index in indices {
-            let [a, b, c] = scene.corners(index as usize);
-            let normal = (b - a).cross(c - a);
-            let length = normal.length();
-            let side = normal.dot(center.ray_from(a).0);
-            let turn = f32::from(i8::from(side > 0.0) - i8::from(side < 0.0));
-            let turn = if length > 0.0 { turn } else { 0.0 };
-            let corners = [a - origin, b - origin, c - origin, a, normal].map(|v| v.to_array());
-            let values = corners.into_iter().flatten().chain([length, turn]);
-            self.parts.iter_mut().zip(values).for_each(|(part, value)| part.push(value));
-            self.count += 1;
+        let corners = triangles.corners();
+        self.lanes.resize(corners.len());
+        let (nothing, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+        for vector in 0..corners.vectors() {
+            let parts = corners.vector(vector);
+            let (a, b) = (load_three(simd, parts, 0), load_three(simd, parts, 3));
+            let c = load_three(simd, parts, 6);
+            let normal = cross(from(b, a), from(c, a));
+            let length = product(normal, normal).sqrt();
+            let way = match center {
+                LightPoint::At(place) => [place.x - a[0], place.y - a[1], place.z - a[2]],
+                LightPoint::Towards(way) => {
+                    [f32x16::splat(simd, way.x), f32x16::splat(simd, way.y), f32x16::splat(simd, way.z)]
+                }
+            };
+            let side = product(normal, way);
+            let turn = side.simd_gt(0.0).select(one, side.simd_lt(0.0).select(-one, nothing));
+            let turn = length.simd_gt(0.0).select(turn, nothing);
+            let origin =
+                [f32x16::splat(simd, origin.x), f32x16::splat(simd, origin.y), f32x16::splat(simd, origin.z)];
+            let three = [from(a, origin), from(b, origin), from(c, origin), a, normal];
+            let into = self.lanes.vector_mut(vector);
+            for part in 0..15 {
+                into[part] = three[part / 3][part % 3].to_array();
+            }
+            (into[15], into[16]) = (length.to_array(), turn.to_array());
         }
-        self.pad();
-    }
-
-    fn pad(&mut self) {
-        let padded = self.count.next_multiple_of(LANES);
-        self.parts.iter_mut().for_each(|part| part.resize(padded, 0.0));
     }
 
     /// Keeps the faces that may count before some of the receivers, whose box, relative to the origin, is `bounds`.
@@ -97,16 +105,16 @@ impl BlockFaces {
             towards @ LightPoint::Towards(_) => towards,
         };
         let (mut kept, mut covers) = (0, false);
-        for first in (0..self.count).step_by(LANES) {
-            let valid = (1u64 << (self.count - first).min(LANES)) - 1;
+        for vector in 0..self.lanes.vectors() {
+            let valid = self.lanes.valid(vector);
             let (mut inside, mut outside) = (0, 0);
             if is_known {
-                (inside, outside) = self.sides(simd, first, bounds, center);
+                (inside, outside) = self.sides(simd, vector, bounds, center);
             }
             let (mut any, mut all) = (0, u64::MAX);
             let asked = valid & !outside;
             for (_, receiver) in receivers {
-                let behind = self.behind(simd, first, receiver);
+                let behind = self.behind(simd, vector, receiver);
                 (any, all) = (any | behind, all & behind);
                 // Whether it lies between is known of none, and all before whom it may.
                 if any & asked == asked && all & inside & asked == 0 {
@@ -114,11 +122,9 @@ impl BlockFaces {
                 }
             }
             covers |= all & inside & asked != 0;
-            kept = keep_lanes(&mut self.parts, first, any & asked, kept);
+            kept = self.lanes.keep(vector, any & asked, kept);
         }
-        self.count = kept;
-        self.parts.iter_mut().for_each(|part| part.truncate(kept));
-        self.pad();
+        self.lanes.resize(kept);
         match kept {
             0 => Before::None,
             _ if covers => Before::All,
@@ -130,14 +136,14 @@ impl BlockFaces {
     #[inline(always)]
     pub(crate) fn before<S: Simd>(&self, simd: S, receiver: &Receiver, site: &Site) -> i32 {
         let mut count = 0;
-        for first in (0..self.count).step_by(LANES) {
-            let behind = self.behind(simd, first, receiver);
+        for vector in 0..self.lanes.vectors() {
+            let behind = self.behind(simd, vector, receiver) & self.lanes.valid(vector);
             if behind == 0 {
                 continue;
             }
-            let a = site.locate_vector(self.corner(simd, first, 0, site.point));
-            let b = site.locate_vector(self.corner(simd, first, 3, site.point));
-            let c = site.locate_vector(self.corner(simd, first, 6, site.point));
+            let a = site.locate_vector(self.corner(simd, vector, 0, site.point));
+            let b = site.locate_vector(self.corner(simd, vector, 3, site.point));
+            let c = site.locate_vector(self.corner(simd, vector, 6, site.point));
             let sides = [is_left(cross(a, b)), is_left(cross(b, c)), is_left(cross(c, a))];
             let meets = !(sides[0] ^ sides[1]) & !(sides[0] ^ sides[2]);
             count += (behind & meets).count_ones() as i32;
@@ -146,39 +152,39 @@ impl BlockFaces {
     }
 
     #[inline(always)]
-    fn part<S: Simd>(&self, simd: S, kind: usize, first: usize) -> f32x16<S> {
-        f32x16::from_slice(simd, &self.parts[kind][first..first + LANES])
+    fn part<S: Simd>(&self, simd: S, kind: usize, vector: usize) -> f32x16<S> {
+        f32x16::load_array_ref(simd, &self.lanes.vector(vector)[kind])
     }
 
     /// Corners whose x has the number `kind`, counted from a point.
     #[inline(always)]
-    fn corner<S: Simd>(&self, simd: S, first: usize, kind: usize, point: Vec3) -> [f32x16<S>; 3] {
-        let (x, y) = (self.part(simd, kind, first), self.part(simd, kind + 1, first));
-        [x - point.x, y - point.y, self.part(simd, kind + 2, first) - point.z]
+    fn corner<S: Simd>(&self, simd: S, vector: usize, kind: usize, point: Vec3) -> [f32x16<S>; 3] {
+        let (x, y) = (self.part(simd, kind, vector), self.part(simd, kind + 1, vector));
+        [x - point.x, y - point.y, self.part(simd, kind + 2, vector) - point.z]
     }
 
     /// Faces behind which a receiver lies as the light's centre sees them, a bit each: `receiver_plane::is_behind`.
     #[inline(always)]
-    fn behind<S: Simd>(&self, simd: S, first: usize, receiver: &Receiver) -> u64 {
+    fn behind<S: Simd>(&self, simd: S, vector: usize, receiver: &Receiver) -> u64 {
         let Receiver { point, tolerance, .. } = *receiver;
-        let x = point.x - self.part(simd, 9, first);
-        let y = point.y - self.part(simd, 10, first);
-        let z = point.z - self.part(simd, 11, first);
-        let (nx, ny) = (self.part(simd, 12, first), self.part(simd, 13, first));
-        let height = nx * x + ny * y + self.part(simd, 14, first) * z;
-        let (length, turn) = (self.part(simd, 15, first), self.part(simd, 16, first));
+        let x = point.x - self.part(simd, 9, vector);
+        let y = point.y - self.part(simd, 10, vector);
+        let z = point.z - self.part(simd, 11, vector);
+        let (nx, ny) = (self.part(simd, 12, vector), self.part(simd, 13, vector));
+        let height = nx * x + ny * y + self.part(simd, 14, vector) * z;
+        let (length, turn) = (self.part(simd, 15, vector), self.part(simd, 16, vector));
         (-(height * turn)).simd_gt(length * tolerance).to_bitmask()
     }
 
     /// Which faces have all of a box within the planes through their edges and the light's centre, or within those opposite;
     /// and which have all of it neither within nor within.
     #[inline(always)]
-    fn sides<S: Simd>(&self, simd: S, first: usize, bounds: &Aabb, center: LightPoint) -> (u64, u64) {
+    fn sides<S: Simd>(&self, simd: S, vector: usize, bounds: &Aabb, center: LightPoint) -> (u64, u64) {
         let (middle, half) = (bounds.center(), 0.5 * bounds.size());
         let (mut positive, mut negative) = ([0; 3], [0; 3]);
         for side in 0..3 {
-            let a = self.corner(simd, first, 3 * side, Vec3::ZERO);
-            let b = self.corner(simd, first, 3 * ((side + 1) % 3), Vec3::ZERO);
+            let a = self.corner(simd, vector, 3 * side, Vec3::ZERO);
+            let b = self.corner(simd, vector, 3 * ((side + 1) % 3), Vec3::ZERO);
             let along = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
             let way = match center {
                 LightPoint::At(place) => [place.x - a[0], place.y - a[1], place.z - a[2]],
@@ -218,4 +224,16 @@ fn is_steep(light: &Light, bounds: &Aabb, origin: Vec3) -> bool {
     let reach = 0.5 * bounds.size();
     // The least height over the plane against the greatest distance.
     normal.dot(way).abs() - normal.abs().dot(reach) > FLATTEST * (way.length() + reach.length())
+}
+
+/// b − a.
+#[inline(always)]
+fn from<S: Simd>(b: [f32x16<S>; 3], a: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    [b[0] - a[0], b[1] - a[1], b[2] - a[2]]
+}
+
+/// a·b, summed as glam does.
+#[inline(always)]
+fn product<S: Simd>(a: [f32x16<S>; 3], b: [f32x16<S>; 3]) -> f32x16<S> {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

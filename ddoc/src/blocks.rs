@@ -11,6 +11,7 @@
 //! Whatever is left out would not have counted, so that the image is the same without blocks (`skip` off).
 
 use fearless_simd::Simd;
+use glam::Vec3;
 use gnomon_shadow_map::light_cone::LightCone;
 use gnomon_shadow_map::light_maps::Receiver;
 use scene_core::Light;
@@ -147,9 +148,14 @@ fn shade_blocks<S: Simd>(simd: S, tile: &Tile<'_, '_>, thread: &mut Thread, valu
     thread.blocks.push(Block { receivers: 0..thread.receivers.len(), part_of: None });
     while let Some(Block { receivers, part_of }) = thread.blocks.pop() {
         let held = &mut thread.receivers[receivers.clone()];
-        let bounds = Aabb::from_points(held.iter().map(|(_, receiver)| receiver.point - origin));
-        let beam = |hull: Option<_>| hull.and_then(|hull| Beam::new(&bounds, hull, origin));
-        let (to_light, to_center) = (beam(prepared.hull.as_ref()), beam(prepared.center_hull.as_ref()));
+        let bounds = bounds_of(held, origin);
+        let (mut to_light, mut to_center) = (None, None);
+        if let Some(hull) = &prepared.hull {
+            to_light = Beam::new(simd, &bounds, hull, origin);
+        }
+        if let Some(hull) = &prepared.center_hull {
+            to_center = Beam::new(simd, &bounds, hull, origin);
+        }
         // Those of a part lie one place above those of the whole.
         let place = part_of.map_or(0, |whole| whole + 1);
         if thread.chosen.len() == place {
@@ -158,8 +164,8 @@ fn shade_blocks<S: Simd>(simd: S, tile: &Tile<'_, '_>, thread: &mut Thread, valu
         let (below, above) = thread.chosen.split_at_mut(place);
         let (edges, faces) = &mut above[0];
         if let Some((edges_below, faces_below)) = below.last() {
-            edges.take_within(simd, edges_below, to_light.as_ref());
-            faces.take_within(simd, faces_below, to_center.as_ref());
+            edges.take_within(simd, edges_below, to_light.as_ref(), Vec3::ZERO);
+            faces.take_within(simd, faces_below, to_center.as_ref(), origin);
         } else {
             let (seen_edges, seen_faces) = (&mut thread.seen_edges, &mut thread.seen_faces);
             let new = splats.of_all_within(level, number).filter(|&index| seen_edges.is_new(index));
@@ -167,13 +173,13 @@ fn shade_blocks<S: Simd>(simd: S, tile: &Tile<'_, '_>, thread: &mut Thread, valu
                 let edge = &prepared.edges[index as usize];
                 [edge.a.x, edge.a.y, edge.a.z, edge.b.x, edge.b.y, edge.b.z]
             };
-            edges.gather(simd, new, ends, to_light.as_ref());
+            edges.gather(simd, new, ends, to_light.as_ref(), Vec3::ZERO);
             let new = lists.of_all_within(level, number).filter(|&index| seen_faces.is_new(index));
             let corners = |index: u32| {
-                let [a, b, c] = scene.corners(index as usize).map(|corner| corner - origin);
+                let [a, b, c] = scene.corners(index as usize);
                 [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z]
             };
-            faces.gather(simd, new, corners, to_center.as_ref());
+            faces.gather(simd, new, corners, to_center.as_ref(), origin);
         }
         let is_small = held.len() <= FEW_RECEIVERS
             || edges.len() <= FEW_EDGES
@@ -191,7 +197,7 @@ fn shade_blocks<S: Simd>(simd: S, tile: &Tile<'_, '_>, thread: &mut Thread, valu
         let held = &thread.receivers[receivers.clone()];
         thread.edges.gather(&prepared.edges, edges.indices().iter().copied());
         thread.edges.keep_for(simd, held, origin, silhouettes);
-        thread.faces.gather(scene, faces.indices().iter().copied(), origin, light.center());
+        thread.faces.gather(simd, faces, origin, light.center());
         let before = thread.faces.keep_for(simd, held, &bounds, (light, origin));
         if thread.edges.is_empty() {
             thread.without_edge += held.len() as u64;
@@ -219,6 +225,16 @@ fn shade_blocks<S: Simd>(simd: S, tile: &Tile<'_, '_>, thread: &mut Thread, valu
             values[slot as usize] = tile.answer(simd, &receiver, (&site, cone), at_center, thread);
         }
     }
+}
+
+/// The box around receivers, relative to the origin. A difference rounded is the least where the number was.
+#[inline(always)]
+fn bounds_of(receivers: &[(u32, Receiver)], origin: Vec3) -> Aabb {
+    let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for (_, receiver) in receivers {
+        (min, max) = (min.min(receiver.point), max.max(receiver.point));
+    }
+    Aabb { min: min - origin, max: max - origin }
 }
 
 impl Tile<'_, '_> {

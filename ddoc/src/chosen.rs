@@ -4,76 +4,65 @@
 //! component, and the number of what they belong to.
 
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
+use glam::Vec3;
 
 use crate::beam::Beam;
-
-/// Lanes of a vector.
-pub(crate) const LANES: usize = 16;
-
-/// Moves the lanes that `bits` name, of the vector at `first`, down to where `kept` are already, and says how many are kept then.
-#[inline(always)]
-pub(crate) fn keep_lanes(parts: &mut [Vec<f32>], first: usize, mut bits: u64, mut kept: usize) -> usize {
-    while bits != 0 {
-        let lane = first + bits.trailing_zeros() as usize;
-        bits &= bits - 1;
-        parts.iter_mut().for_each(|part| part[kept] = part[lane]);
-        kept += 1;
-    }
-    kept
-}
+use crate::lanes::{LANES, Lanes};
 
 /// Things of N/3 corners each.
 #[derive(Debug)]
 pub(crate) struct Chosen<const N: usize> {
-    /// Which, and how many; what comes after them fills the last vector.
+    /// Which; what comes after them fills the last vector.
     indices: Vec<u32>,
-    count: usize,
-    /// x, y and z of the corners, from the origin of edges.
-    parts: [Vec<f32>; N],
+    /// x, y and z of the corners.
+    corners: Lanes<N>,
 }
 
 impl<const N: usize> Default for Chosen<N> {
     fn default() -> Self {
-        Self { indices: Vec::new(), count: 0, parts: std::array::from_fn(|_| Vec::new()) }
+        Self { indices: Vec::new(), corners: Lanes::default() }
     }
 }
 
 impl<const N: usize> Chosen<N> {
     /// How many there are.
     pub(crate) fn len(&self) -> usize {
-        self.count
+        self.corners.len()
     }
 
     /// Which they are.
     pub(crate) fn indices(&self) -> &[u32] {
-        &self.indices[..self.count]
+        &self.indices[..self.len()]
     }
 
-    /// Makes room for so many, and a vector more: one is written whole wherever those before it ended.
-    fn resize(&mut self, count: usize) {
-        let padded = count + 2 * LANES;
-        if self.indices.len() < padded {
-            self.indices.resize(padded, 0);
-            self.parts.iter_mut().for_each(|part| part.resize(padded, 0.0));
-        }
+    /// Their corners.
+    pub(crate) fn corners(&self) -> &Lanes<N> {
+        &self.corners
     }
 
     /// Takes over the lanes of a vector that `bits` name.
     #[inline(always)]
     fn take(&mut self, mut bits: u64, indices: &[u32; LANES], parts: &[[f32; LANES]; N]) {
+        let mut at = self.corners.len();
+        self.corners.resize(at + bits.count_ones() as usize);
+        // Vectors are copied whole: there is always room for one more.
+        if self.indices.len() < at + 2 * LANES {
+            self.indices.resize(at + 2 * LANES, 0);
+        }
         while bits != 0 {
             let lane = bits.trailing_zeros() as usize % LANES;
             bits &= bits - 1;
-            let at = self.count;
             self.indices[at] = indices[lane];
-            for (to, from) in self.parts.iter_mut().zip(parts) {
-                to[at] = from[lane];
+            let (to, to_lane) = (self.corners.vector_mut(at / LANES), at % LANES);
+            for (to, from) in to.iter_mut().zip(parts) {
+                to[to_lane] = from[lane];
             }
-            self.count += 1;
+            at += 1;
         }
     }
 
-    /// Takes those of `things` that [`Beam`] lets through; all without one. `corners` gives a thing's.
+    /// Takes those of `things` that [`Beam`] lets through; all without one. `corners` gives a thing's, and `origin` is where the
+    /// beam's planes count from, in the coordinates of the corners.
     #[inline(always)]
     pub(crate) fn gather<S: Simd>(
         &mut self,
@@ -81,8 +70,9 @@ impl<const N: usize> Chosen<N> {
         mut things: impl Iterator<Item = u32>,
         corners: impl Fn(u32) -> [f32; N],
         beam: Option<&Beam>,
+        origin: Vec3,
     ) {
-        self.count = 0;
+        self.corners.clear();
         let (mut indices, mut parts) = ([0u32; LANES], [[0.0f32; LANES]; N]);
         loop {
             let mut count = 0;
@@ -95,8 +85,7 @@ impl<const N: usize> Chosen<N> {
                 indices[count] = index;
                 count += 1;
             }
-            self.resize(self.count + count);
-            self.take(inside(simd, beam, &parts) & ((1 << count) - 1), &indices, &parts);
+            self.take(inside(simd, beam, &parts, origin) & ((1 << count) - 1), &indices, &parts);
             if count < LANES {
                 break;
             }
@@ -105,35 +94,36 @@ impl<const N: usize> Chosen<N> {
 
     /// Takes those of `other` that `beam` lets through; all without one.
     #[inline(always)]
-    pub(crate) fn take_within<S: Simd>(&mut self, simd: S, other: &Self, beam: Option<&Beam>) {
-        self.count = 0;
-        self.resize(other.count);
-        let (mut indices, mut parts) = ([0u32; LANES], [[0.0f32; LANES]; N]);
-        for first in (0..other.count).step_by(LANES) {
+    pub(crate) fn take_within<S: Simd>(&mut self, simd: S, other: &Self, beam: Option<&Beam>, origin: Vec3) {
+        self.corners.clear();
+        let mut indices = [0u32; LANES];
+        for vector in 0..other.corners.vectors() {
+            let first = vector * LANES;
             indices.copy_from_slice(&other.indices[first..first + LANES]);
-            for (to, from) in parts.iter_mut().zip(&other.parts) {
-                to.copy_from_slice(&from[first..first + LANES]);
-            }
-            let valid = (1 << (other.count - first).min(LANES)) - 1;
-            self.take(inside(simd, beam, &parts) & valid, &indices, &parts);
+            let parts = other.corners.vector(vector);
+            self.take(inside(simd, beam, parts, origin) & other.corners.valid(vector), &indices, parts);
         }
     }
 }
 
 /// Lanes that do not lie outside, a bit each.
 #[inline(always)]
-fn inside<S: Simd, const N: usize>(simd: S, beam: Option<&Beam>, parts: &[[f32; LANES]; N]) -> u64 {
+fn inside<S: Simd, const N: usize>(
+    simd: S,
+    beam: Option<&Beam>,
+    parts: &[[f32; LANES]; N],
+    origin: Vec3,
+) -> u64 {
     let Some(beam) = beam else { return u64::MAX };
-    let mut outside = 0;
-    for plane in &beam.planes {
-        let mut beyond = u64::MAX;
-        for corner in parts.chunks_exact(3) {
-            let (x, y) = (f32x16::load_array_ref(simd, &corner[0]), f32x16::load_array_ref(simd, &corner[1]));
-            let z = f32x16::load_array_ref(simd, &corner[2]);
+    let mut beyond = [u64::MAX; 5];
+    for corner in parts.chunks_exact(3) {
+        let x = f32x16::load_array_ref(simd, &corner[0]) - origin.x;
+        let y = f32x16::load_array_ref(simd, &corner[1]) - origin.y;
+        let z = f32x16::load_array_ref(simd, &corner[2]) - origin.z;
+        for (beyond, plane) in beyond.iter_mut().zip(&beam.planes) {
             let height = x * plane.x + y * plane.y + z * plane.z + plane.w;
-            beyond &= height.simd_gt(0.0).to_bitmask();
+            *beyond &= height.simd_gt(0.0).to_bitmask();
         }
-        outside |= beyond;
     }
-    !outside
+    !beyond.into_iter().fold(0, |outside, beyond| outside | beyond)
 }

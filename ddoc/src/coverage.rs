@@ -24,7 +24,7 @@ use gnomon_shadow_map::light_cone::LightCone;
 use gnomon_shadow_map::light_maps::Receiver;
 use scene_core::light::LightPoint;
 
-use crate::chosen::LANES;
+use crate::lanes::LANES;
 use crate::tile_edges::{TileEdges, cross, dot};
 
 /// A receiver, relative to the edges' origin, and the light over it.
@@ -149,18 +149,20 @@ pub struct Counter {
 impl Counter {
     /// Takes the points of the light for the receivers to come.
     #[inline(always)]
-    pub fn set_points(&mut self, points: impl Iterator<Item = Vec2>) {
-        self.xs.clear();
-        self.ys.clear();
-        for point in points {
-            self.xs.push(point.x);
-            self.ys.push(point.y);
+    pub fn set_points(&mut self, points: impl ExactSizeIterator<Item = Vec2>) {
+        let count = points.len();
+        let padded = count.next_multiple_of(LANES);
+        self.xs.resize(padded, 0.0);
+        self.ys.resize(padded, 0.0);
+        for ((x, y), point) in self.xs.iter_mut().zip(&mut self.ys).zip(points) {
+            (*x, *y) = (point.x, point.y);
         }
-        let padded = self.xs.len().next_multiple_of(LANES);
-        // Copies of the last point: they change no least count.
-        let last = (self.xs.last().copied().unwrap_or(0.0), self.ys.last().copied().unwrap_or(0.0));
-        self.xs.resize(padded, last.0);
-        self.ys.resize(padded, last.1);
+        if count > 0 {
+            // Copies of the last point: they change no least count.
+            let (x, y) = (self.xs[count - 1], self.ys[count - 1]);
+            self.xs[count..].fill(x);
+            self.ys[count..].fill(y);
+        }
     }
 
     /// Finds the edges that may lie over the light of a receiver: m(e) ≠ 0, not below its plane, and not beside the square
@@ -170,8 +172,8 @@ impl Counter {
     pub fn set_receiver<S: Simd>(&mut self, simd: S, site: &Site, edges: &TileEdges) -> f32 {
         self.crossings.clear();
         let mut most = 0.0;
-        for first in (0..edges.len()).step_by(LANES) {
-            most += find_crossings(simd, site, edges, first, &mut self.crossings);
+        for vector in 0..edges.vectors() {
+            most += find_crossings(simd, site, edges, vector, &mut self.crossings);
         }
         most
     }
@@ -222,21 +224,20 @@ fn find_crossings<S: Simd>(
     simd: S,
     site: &Site,
     edges: &TileEdges,
-    first: usize,
+    vector: usize,
     found: &mut Vec<Crossing>,
 ) -> f32 {
     let Site { point, normal, tolerance, orientation, is_parallel, .. } = *site;
-    let (from, to) = (edges.from(simd, first, 0, point), edges.from(simd, first, 3, point));
+    let (from, to) = (edges.from(simd, vector, 0, point), edges.from(simd, vector, 3, point));
     let heights = [dot(normal, from) - tolerance, dot(normal, to) - tolerance];
     let (mut a, mut b) = (site.locate_vector(from), site.locate_vector(to));
-    let multiplicity = edges.multiplicity(simd, first, point);
+    let multiplicity = edges.multiplicity(simd, vector, point);
     let dead = beside([a[0], a[2]], [b[0], b[2]])
         | beside([a[1], a[2]], [b[1], b[2]])
         | multiplicity.simd_eq(0.0).to_bitmask();
-    let valid = (1u64 << (edges.len() - first).min(LANES)) - 1;
-    let mut there = !dead & valid;
+    let mut there = !dead & edges.valid(vector);
     if edges.has_far() {
-        let far = edges.from(simd, first, 16, point);
+        let far = edges.from(simd, vector, 16, point);
         // NaN does not rise.
         there &= !dot(normal, far).simd_gt(tolerance).to_bitmask();
     }
@@ -330,7 +331,6 @@ mod tests {
         let site = Site::new(point, Vec3::Y, 1e-6, &cone, false);
         let mut tile = TileEdges::default();
         edges.iter().for_each(|edge| tile.push(edge));
-        tile.pad();
         let mut counter = Counter::default();
         // Half a step inside, so that no point lies on an edge.
         let grid = |i: u32| Vec2::new((i % 32) as f32, (i / 32) as f32) / 16.0 + (1.0 / 32.0 - 1.0);

@@ -14,6 +14,7 @@ pub mod faces;
 pub mod gpu;
 pub mod grid;
 pub mod image_edges;
+mod lanes;
 pub mod layers;
 pub mod light_image;
 mod light_points;

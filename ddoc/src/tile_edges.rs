@@ -4,7 +4,7 @@ use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
 use glam::Vec3;
 use gnomon_shadow_map::light_maps::Receiver;
 
-use crate::chosen::{LANES, keep_lanes};
+use crate::lanes::{Lanes, load_three};
 use crate::silhouettes::Edge;
 
 /// Numbers an edge: a, b, the two planes, the two signs; the point seen past the edge.
@@ -13,16 +13,15 @@ const PARTS: usize = 19;
 /// Edges of a block, component by component.
 #[derive(Debug, Default)]
 pub struct TileEdges {
-    parts: [Vec<f32>; PARTS],
-    count: usize,
+    lanes: Lanes<PARTS>,
     has_far: bool,
 }
 
 impl TileEdges {
     /// Forgets all.
     pub fn clear(&mut self) {
-        self.parts.iter_mut().for_each(Vec::clear);
-        (self.count, self.has_far) = (0, false);
+        self.lanes.clear();
+        self.has_far = false;
     }
 
     /// Adds an edge.
@@ -30,29 +29,19 @@ impl TileEdges {
     pub fn push(&mut self, edge: &Edge) {
         let [p, q] = edge.planes.map(|plane| plane.to_array());
         let (a, b, far, [first, second]) = (edge.a, edge.b, edge.far, edge.signs);
+        self.has_far |= !far.is_nan();
         #[rustfmt::skip]
-        let values = [
+        self.lanes.push([
             a.x, a.y, a.z, b.x, b.y, b.z, p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3], first, second,
             far.x, far.y, far.z,
-        ];
-        self.has_far |= !far.is_nan();
-        for (part, value) in self.parts.iter_mut().zip(values) {
-            part.push(value);
-        }
-        self.count += 1;
+        ]);
     }
 
-    /// Fills the last lanes with edges that never count.
-    pub fn pad(&mut self) {
-        let padded = self.count.next_multiple_of(LANES);
-        self.parts.iter_mut().for_each(|part| part.resize(padded, 0.0));
-    }
-
-    /// Takes over those of `edges` that are named, and fills the last lanes.
+    /// Takes over those of `edges` that are named.
+    #[inline(always)]
     pub fn gather(&mut self, edges: &[Edge], indices: impl Iterator<Item = u32>) {
         self.clear();
         indices.for_each(|index| self.push(&edges[index as usize]));
-        self.pad();
     }
 
     /// Keeps the edges that may count for some of the receivers: those that rise above its plane and, where it is `silhouettes`
@@ -67,65 +56,70 @@ impl TileEdges {
         silhouettes: bool,
     ) {
         let mut kept = 0;
-        for first in (0..self.count).step_by(LANES) {
-            let valid = (1u64 << (self.count - first).min(LANES)) - 1;
+        for vector in 0..self.lanes.vectors() {
+            let valid = self.lanes.valid(vector);
             let mut counts = 0;
             for (_, receiver) in receivers {
                 let point = receiver.point - origin;
-                let from = self.from(simd, first, 0, point);
-                let to = self.from(simd, first, 3, point);
+                let from = self.from(simd, vector, 0, point);
+                let to = self.from(simd, vector, 3, point);
                 let a = dot(receiver.normal, from) - receiver.tolerance;
                 let b = dot(receiver.normal, to) - receiver.tolerance;
                 let mut bits = !(a.simd_le(0.0) & b.simd_le(0.0)).to_bitmask();
                 if silhouettes {
-                    bits &= !self.multiplicity(simd, first, point).simd_eq(0.0).to_bitmask();
+                    bits &= !self.multiplicity(simd, vector, point).simd_eq(0.0).to_bitmask();
                 }
                 counts |= bits;
                 if counts & valid == valid {
                     break;
                 }
             }
-            kept = keep_lanes(&mut self.parts, first, counts & valid, kept);
+            kept = self.lanes.keep(vector, counts & valid, kept);
         }
-        self.count = kept;
-        self.parts.iter_mut().for_each(|part| part.truncate(kept));
-        self.pad();
+        self.lanes.resize(kept);
     }
 
     /// Corners of a vector of edges, whose x has the number `kind`, counted from a point.
     #[inline(always)]
-    pub(crate) fn from<S: Simd>(&self, simd: S, first: usize, kind: usize, point: Vec3) -> [f32x16<S>; 3] {
-        let (x, y) = (self.part(simd, kind, first), self.part(simd, kind + 1, first));
-        [x - point.x, y - point.y, self.part(simd, kind + 2, first) - point.z]
+    pub(crate) fn from<S: Simd>(&self, simd: S, vector: usize, kind: usize, point: Vec3) -> [f32x16<S>; 3] {
+        let [x, y, z] = load_three(simd, self.lanes.vector(vector), kind);
+        [x - point.x, y - point.y, z - point.z]
     }
 
     /// m(e) of a vector of edges as seen from a point.
     #[inline(always)]
-    pub(crate) fn multiplicity<S: Simd>(&self, simd: S, first: usize, point: Vec3) -> f32x16<S> {
-        self.side(simd, first, 6, 14, point) + self.side(simd, first, 10, 15, point)
+    pub(crate) fn multiplicity<S: Simd>(&self, simd: S, vector: usize, point: Vec3) -> f32x16<S> {
+        self.side(simd, vector, 6, 14, point) + self.side(simd, vector, 10, 15, point)
     }
 
     /// sign(e, f)·side(f, p) of the faces whose planes begin at `plane`, and whose signs are `sign`.
     #[inline(always)]
-    fn side<S: Simd>(&self, simd: S, first: usize, plane: usize, sign: usize, point: Vec3) -> f32x16<S> {
-        let (x, y) = (self.part(simd, plane, first), self.part(simd, plane + 1, first));
-        let (z, d) = (self.part(simd, plane + 2, first), self.part(simd, plane + 3, first));
+    fn side<S: Simd>(&self, simd: S, vector: usize, plane: usize, sign: usize, point: Vec3) -> f32x16<S> {
+        let parts = self.lanes.vector(vector);
+        let [x, y, z] = load_three(simd, parts, plane);
+        let d = f32x16::load_array_ref(simd, &parts[plane + 3]);
         let at = x * point.x + y * point.y + z * point.z + d;
-        let sign = self.part(simd, sign, first);
+        let sign = f32x16::load_array_ref(simd, &parts[sign]);
         fearless_simd::Select::select(at.simd_ge(0.0), sign, -sign)
     }
 
     /// The ends of an edge.
     #[inline]
     pub(crate) fn ends(&self, index: usize) -> [Vec3; 2] {
-        let at = |part: usize| self.parts[part][index];
+        let at = |part: usize| self.lanes.at(index, part);
         [Vec3::new(at(0), at(1), at(2)), Vec3::new(at(3), at(4), at(5))]
     }
 
-    /// A vector of the numbers of one kind, from edge `first` on.
+    /// Vectors that there are.
     #[inline(always)]
-    fn part<S: Simd>(&self, simd: S, kind: usize, first: usize) -> f32x16<S> {
-        f32x16::from_slice(simd, &self.parts[kind][first..first + LANES])
+    pub(crate) fn vectors(&self) -> usize {
+        self.lanes.vectors()
+    }
+
+    /// Lanes of a vector that are edges, a bit each.
+    #[inline(always)]
+    pub(crate) fn valid(&self, vector: usize) -> u64 {
+        self.lanes.valid(vector)
     }
 
     /// Whether of some a point seen past them is known.
@@ -137,12 +131,12 @@ impl TileEdges {
     /// Edges there are.
     #[inline(always)]
     pub fn len(&self) -> usize {
-        self.count
+        self.lanes.len()
     }
 
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.count == 0
+        self.len() == 0
     }
 }
 
