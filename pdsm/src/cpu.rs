@@ -111,37 +111,47 @@ fn draw_maps(
     grids.iter_mut().for_each(DepthGrid::drawn);
 }
 
-/// `shade.lookup`: V of every pixel that sees a surface, NaN elsewhere.
-pub fn shade(lookup: &Lookup<'_>, gbuffer: &GBuffer, visibility: &mut VisibilityImage) {
+/// `shade.lookup`: V of every pixel that sees a surface, NaN elsewhere. Also how many lookups were answered by where functions
+/// start alone.
+pub fn shade(lookup: &Lookup<'_>, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> u64 {
     let width = gbuffer.width.max(1) as usize;
     let level = Level::new();
-    visibility.values.par_chunks_mut(width).enumerate().for_each(|(row, values)| {
-        // Without vector instructions rounding down is a call.
-        dispatch!(level, simd => shade_row(simd, lookup, gbuffer, row * width, values));
-    });
+    let rows = visibility.values.par_chunks_mut(width).enumerate();
+    // Without vector instructions rounding down is a call.
+    rows.map(|(row, values)| dispatch!(level, simd => shade_row(simd, lookup, gbuffer, row * width, values)))
+        .sum()
 }
 
 #[inline(always)]
-fn shade_row<S: Simd>(_simd: S, lookup: &Lookup<'_>, gbuffer: &GBuffer, first: usize, values: &mut [f32]) {
+fn shade_row<S: Simd>(
+    _simd: S,
+    lookup: &Lookup<'_>,
+    gbuffer: &GBuffer,
+    first: usize,
+    values: &mut [f32],
+) -> u64 {
+    let mut lit = 0;
     for (values, first) in values.chunks_mut(BATCH).zip((first..).step_by(BATCH)) {
-        lookup.surfaces(gbuffer, first, values);
+        lit += lookup.surfaces(gbuffer, first, values);
     }
+    lit
 }
 
 /// Free points that a task looks up.
 const POINTS: usize = 1024;
 
-/// `shade.lookup` of free points: V, NaN at what is no point.
-pub fn free_points(lookup: &Lookup<'_>, points: &[Vec3], visibility: &mut [f32]) {
+/// `shade.lookup` of free points: V, NaN at what is no point. Also how many lookups were answered by where functions start alone.
+pub fn free_points(lookup: &Lookup<'_>, points: &[Vec3], visibility: &mut [f32]) -> u64 {
     let level = Level::new();
-    visibility.par_chunks_mut(POINTS).zip(points.par_chunks(POINTS)).for_each(|(values, points)| {
-        dispatch!(level, simd => free_chunk(simd, lookup, points, values));
-    });
+    let tasks = visibility.par_chunks_mut(POINTS).zip(points.par_chunks(POINTS));
+    tasks.map(|(values, points)| dispatch!(level, simd => free_chunk(simd, lookup, points, values))).sum()
 }
 
 #[inline(always)]
-fn free_chunk<S: Simd>(_simd: S, lookup: &Lookup<'_>, points: &[Vec3], values: &mut [f32]) {
+fn free_chunk<S: Simd>(_simd: S, lookup: &Lookup<'_>, points: &[Vec3], values: &mut [f32]) -> u64 {
+    let mut lit = 0;
     for (values, points) in values.chunks_mut(BATCH).zip(points.chunks(BATCH)) {
-        lookup.free_points(points, values);
+        lit += lookup.free_points(points, values);
     }
+    lit
 }

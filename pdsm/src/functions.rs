@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::compression::{Compression, Compressor};
 use crate::events::EventStrips;
+use crate::guide::Guide;
 use crate::nodes::{Node, Nodes};
 use crate::sorting::SortedStrip;
 use crate::surfaces::Surfaces;
@@ -19,6 +20,7 @@ pub struct Functions {
     index: Vec<u32>,
     nodes: Nodes,
     statistics: Statistics,
+    guide: Guide,
 }
 
 /// How long the functions are.
@@ -104,7 +106,7 @@ impl Functions {
         places.into_par_iter().zip(&strips).for_each(|(place, strip)| place.copy_from_slice(&strip.nodes));
         functions.index.push(start);
         functions.nodes = Nodes::Full(nodes);
-        functions
+        functions.guided()
     }
 
     /// Functions that were kept as they lie in memory. `None` unless there are `size`² + 1 entries of the index, ascending
@@ -124,7 +126,8 @@ impl Functions {
                 ascends
             })
         };
-        (is_whole && index.windows(2).all(is_function)).then_some(Self { size, index, nodes, statistics })
+        (is_whole && index.windows(2).all(is_function))
+            .then(|| Self { size, index, nodes, statistics, guide: Guide::default() }.guided())
     }
 
     /// The same functions with 16 bits a number.
@@ -133,7 +136,11 @@ impl Functions {
             Nodes::Full(nodes) => Nodes::packed(&nodes),
             packed @ Nodes::Packed(..) => packed,
         };
-        Self { nodes, ..self }
+        Self { nodes, ..self }.guided()
+    }
+
+    fn guided(self) -> Self {
+        Self { guide: Guide::new(self.size, &self.index, &self.nodes), ..self }
     }
 
     /// Pixels a side.
@@ -161,31 +168,18 @@ impl Functions {
         self.index.windows(2).filter(|pair| pair[0] == pair[1]).count() as u64
     }
 
-    /// Bytes held.
+    /// Bytes held, with what leads lookups to their nodes.
     pub fn bytes(&self) -> u64 {
-        (size_of_val(self.index.as_slice()) + size_of_val(self.nodes.words())) as u64
+        (size_of_val(self.index.as_slice()) + size_of_val(self.nodes.words())) as u64 + self.guide.bytes()
     }
 
-    /// Where the nodes of four pixels lie: that in column `x`, row `y`, its right neighbour, and the two below. Outside of the
-    /// PDSM there are none.
-    #[inline(always)]
-    pub(crate) fn four(&self, x: i32, y: i32) -> [[u32; 2]; 4] {
-        let last = self.size as i32 - 1;
-        if x < 0 || y < 0 || x >= last || y >= last {
-            return [0, 1, 2, 3].map(|i| self.range(x + i % 2, y + i / 2));
-        }
-        let place = y as usize * self.size as usize + x as usize;
-        let starts = |place: usize| {
-            let starts = &self.index[place..place + 3];
-            [[starts[0], starts[1]], [starts[1], starts[2]]]
-        };
-        let ([a, b], [c, d]) = (starts(place), starts(place + self.size as usize));
-        [a, b, c, d]
+    pub(crate) fn guide(&self) -> &Guide {
+        &self.guide
     }
 
     /// Where the nodes of the pixel in column `x`, row `y` lie.
-    #[inline]
-    fn range(&self, x: i32, y: i32) -> [u32; 2] {
+    #[inline(always)]
+    pub(crate) fn range(&self, x: i32, y: i32) -> [u32; 2] {
         let inside = 0..self.size as i32;
         if !inside.contains(&x) || !inside.contains(&y) {
             return [0; 2];

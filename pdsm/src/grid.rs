@@ -31,7 +31,7 @@ impl PixelGrid {
     }
 
     /// Pixel coordinates, whole numbers at pixel centres, of a position in texels.
-    #[inline]
+    #[inline(always)]
     pub fn from_texels(self, position: glam::Vec2) -> glam::Vec2 {
         (position - ((self.ratio / 2) as f32 + 0.5)) / self.ratio as f32
     }

@@ -12,6 +12,7 @@ pub mod gpu;
 mod greedy;
 mod greedy_lanes;
 pub mod grid;
+mod guide;
 pub mod layout;
 mod lookup;
 pub mod maps;
@@ -42,6 +43,9 @@ pub use technique::Factory;
 
 /// Texels a side of the one map of a light without extent, unless its setting says more: the index alone takes 256 MiB.
 const MOST_OF_ONE_MAP: u32 = 8192;
+
+/// What reports call receivers that lie before the first node of all functions that they are read from.
+const LIT: &str = "lookups before all shadows";
 
 /// The technique: settings, from which any number of lights can be prepared.
 #[derive(Clone, Copy, Debug, Default)]
@@ -224,6 +228,7 @@ impl PreparedPdsm<'_> {
             moving: &self.moving,
             tolerance: self.tolerance,
             radius: self.radius(),
+            skip: self.params.skip,
         }
     }
 
@@ -287,7 +292,10 @@ impl PreparedPdsm<'_> {
     pub fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Report {
         let mut report = Report::default();
         let gbuffer = self.origin.gbuffer(gbuffer);
-        report.time("shade.lookup", |_| cpu::shade(&self.lookup(), &gbuffer, visibility));
+        report.time("shade.lookup", |report| {
+            let lit = cpu::shade(&self.lookup(), &gbuffer, visibility);
+            report.skip(LIT, lit);
+        });
         report
     }
 
@@ -304,7 +312,10 @@ impl PreparedPdsm<'_> {
             true => Cow::Borrowed(points),
             false => points.iter().map(|&point| self.origin.point(point)).collect(),
         };
-        report.time("shade.lookup", |_| cpu::free_points(&lookup, &points, visibility));
+        report.time("shade.lookup", |report| {
+            let lit = cpu::free_points(&lookup, &points, visibility);
+            report.skip(LIT, lit);
+        });
         report
     }
 }

@@ -97,7 +97,7 @@ impl Layout {
     }
 
     /// World-space coordinates in the axes.
-    #[inline]
+    #[inline(always)]
     fn local(&self, point: Vec3) -> Vec3 {
         let p = point - self.origin;
         Vec3::from_array(self.axes.map(|axis| axis.dot(p)))
@@ -106,17 +106,26 @@ impl Layout {
     /// Where `point` lies; `None` if this window is not the one that looks at it.
     #[inline]
     pub fn locate(&self, point: Vec3) -> Option<WindowPoint> {
+        let (at, belongs) = self.place(point);
+        belongs.then_some(at)
+    }
+
+    /// Where `point` lies, and whether this window is the one that looks at it: [`locate`](Self::locate) without branches, for
+    /// many at once.
+    #[inline(always)]
+    pub(crate) fn place(&self, point: Vec3) -> (WindowPoint, bool) {
         let local = self.local(point);
+        let (at, before) = self.place_local(local);
         let farthest = self.max_tan * local.z;
-        let belongs = matches!(self.depth, Depth::Parallel { .. })
-            || (local.x.abs() <= farthest && local.y.abs() <= farthest);
-        let Some(Held { bounds, texels: [low, high] }) = self.part else {
-            return if belongs { self.project_local(local) } else { None };
-        };
-        if !belongs || !(bounds.min.cmple(point) & bounds.max.cmpge(point)).all() {
-            return None;
+        let mut belongs = before;
+        if matches!(self.depth, Depth::Central { .. }) {
+            belongs &= (local.x.abs() <= farthest) & (local.y.abs() <= farthest);
         }
-        self.project_local(local).filter(|at| (low.cmple(at.texel) & high.cmpge(at.texel)).all())
+        if let Some(Held { bounds, texels: [low, high] }) = self.part {
+            belongs &= (bounds.min.cmple(point) & bounds.max.cmpge(point)).all();
+            belongs &= (low.cmple(at.texel) & high.cmpge(at.texel)).all();
+        }
+        (at, belongs)
     }
 
     /// Whether it is fitted to a part of a scene.
@@ -141,17 +150,21 @@ impl Layout {
 
     #[inline]
     fn project_local(&self, local: Vec3) -> Option<WindowPoint> {
-        let (on_window, t) = match self.depth {
+        let (at, before) = self.place_local(local);
+        before.then_some(at)
+    }
+
+    /// Where a point lies, and whether it is before the light's plane.
+    #[inline(always)]
+    fn place_local(&self, local: Vec3) -> (WindowPoint, bool) {
+        let (on_window, t, before) = match self.depth {
             Depth::Central { focus } => {
-                if local.z.is_nan() || local.z <= 0.0 {
-                    return None;
-                }
                 let scale = focus / local.z;
-                (local.truncate() * scale, 1.0 - scale)
+                (local.truncate() * scale, 1.0 - scale, local.z > 0.0)
             }
-            Depth::Parallel { focus, per_unit } => (local.truncate(), (local.z - focus) * per_unit),
+            Depth::Parallel { focus, per_unit } => (local.truncate(), (local.z - focus) * per_unit, true),
         };
-        Some(WindowPoint { texel: (on_window - self.corner) * self.texels_per_unit, t })
+        (WindowPoint { texel: (on_window - self.corner) * self.texels_per_unit, t }, before)
     }
 
     /// How t changes along the plane through `point` with unit normal `normal`: per texel of the window, and per unit
@@ -159,7 +172,7 @@ impl Layout {
     ///
     /// The plane N·X = h has 1/z = (N.xy·q/F + N.z)/h, so t = 1 − (N.xy·q + N.z·F)/h is linear in q; in parallel light
     /// z = (h − N.xy·q)/N.z. Infinite where the plane holds the light's middle.
-    #[inline]
+    #[inline(always)]
     pub fn plane_slope(&self, point: Vec3, normal: Vec3, t: f32) -> (Vec2, f32) {
         let n = Vec3::from_array(self.axes.map(|axis| axis.dot(normal)));
         match self.depth {
@@ -177,18 +190,31 @@ impl Layout {
     /// The share of the samples that lie above the plane through `point` with unit normal `normal`.
     #[inline]
     pub fn share_above(&self, point: Vec3, normal: Vec3) -> f32 {
-        let n = Vec3::from_array(self.axes.map(|axis| axis.dot(normal)));
-        // N·(C + a − P) for a place, −N·(n + a) for a direction of travel.
-        let (sign, middle) = match self.depth {
-            Depth::Central { .. } => (1.0, normal.dot(self.origin - point)),
-            Depth::Parallel { .. } => (-1.0, -n.z),
-        };
         // Mostly the plane does not cut the light.
-        if middle > n.truncate().abs().dot(self.reach) {
+        if self.is_above(point, normal) {
             return 1.0;
         }
+        let (n, sign, middle) = self.height_of_light(point, normal);
         let above = self.offsets.iter().filter(|&&a| middle + sign * n.truncate().dot(a) > 0.0).count();
         above as f32 / self.offsets.len().max(1) as f32
+    }
+
+    /// Whether all samples lie above the plane: false in doubt.
+    #[inline(always)]
+    pub(crate) fn is_above(&self, point: Vec3, normal: Vec3) -> bool {
+        let (n, _, middle) = self.height_of_light(point, normal);
+        middle > n.truncate().abs().dot(self.reach)
+    }
+
+    /// The normal in the axes, the sign of a sample's offset, and how high the light's middle is above the plane:
+    /// N·(C + a − P) for a place, −N·(n + a) for a direction of travel.
+    #[inline(always)]
+    fn height_of_light(&self, point: Vec3, normal: Vec3) -> (Vec3, f32, f32) {
+        let n = Vec3::from_array(self.axes.map(|axis| axis.dot(normal)));
+        match self.depth {
+            Depth::Central { .. } => (n, 1.0, normal.dot(self.origin - point)),
+            Depth::Parallel { .. } => (n, -1.0, -n.z),
+        }
     }
 
     /// The projection of the map of the sample with step `step`: a texel's x and y in clip space, and reversed depth.
