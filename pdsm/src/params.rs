@@ -59,7 +59,8 @@ pub struct PdsmParams {
     pub precision: Precision,
     /// Keep V at the scene's surfaces alone: fewer nodes, no free points and no objects that move.
     pub only_surfaces: bool,
-    /// Leave out what cannot change the image: rows of maps in which no caster is. Off only to measure.
+    /// Leave out what cannot change the image: rows of maps in which no caster is, and reading functions that start behind what
+    /// asks. Off only to measure.
     pub skip: bool,
     /// The same seed gives the same samples of the light.
     pub seed: u64,

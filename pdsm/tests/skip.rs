@@ -1,4 +1,4 @@
-//! Leaving rows of maps out never changes an image, bit for bit.
+//! Leaving rows of maps and lookups before all shadows out never changes an image, bit for bit.
 
 use gnomon_pdsm::{Pdsm, PdsmParams};
 use scene_core::{VisibilityImage, raster, scenes};
@@ -13,14 +13,16 @@ fn skipping_never_changes_the_image() {
             let params = PdsmParams { views: 9, map_size: 96, pdsm_size: 96, skip, ..Default::default() };
             let (pdsm, report) = Pdsm::new(params).prepare(&setup.scene, &setup.lights[0]);
             let mut image = VisibilityImage::new(setup.camera.width, setup.camera.height);
-            pdsm.shade(&gbuffer, &mut image);
+            let shaded = pdsm.shade(&gbuffer, &mut image);
             (
                 image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>(),
                 report.skipped["map rows without casters"],
+                shaded.skipped["lookups before all shadows"],
             )
         };
-        let ((with, rows), (without, none)) = (shade(true), shade(false));
-        assert!(rows > 0 && none == 0, "{spec}: {rows}");
+        let ((with, rows, lit), (without, no_rows, none_lit)) = (shade(true), shade(false));
+        assert!(rows > 0 && no_rows == 0, "{spec}: {rows}");
+        assert!(lit > 0 && none_lit == 0, "{spec}: {lit}");
         assert_eq!(with, without, "{spec}");
     }
 }

@@ -85,8 +85,8 @@ impl Four {
     #[inline(always)]
     fn choose(&mut self, starts: &[f32], side: usize, places: &Places) -> u64 {
         let mut of_four = [[f32::INFINITY; BATCH]; 4];
-        for k in 0..BATCH {
-            let place = (self.rows[k] + RIM) as usize * side + (self.columns[k] + RIM) as usize;
+        for (k, (&row, &column)) in self.rows.iter().zip(&self.columns).enumerate() {
+            let place = (row + RIM) as usize * side + (column + RIM) as usize;
             if let Some(&[a, b]) = starts.get(place..).and_then(|rest| rest.first_chunk()) {
                 (of_four[0][k], of_four[1][k]) = (a, b);
             }

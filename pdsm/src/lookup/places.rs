@@ -89,10 +89,10 @@ impl Places {
     #[inline(always)]
     pub(super) fn of_points(window: &Window, points: &Points, asked: &Lanes<bool>) -> Self {
         let mut own = Self::new();
-        for k in 0..BATCH {
+        for (k, &asked) in asked.iter().enumerate() {
             let (at, belongs) = window.layout.place(points.get(k));
-            own.belongs[k] = belongs & asked[k];
-            own.is_read[k] = belongs & asked[k];
+            own.belongs[k] = belongs & asked;
+            own.is_read[k] = belongs & asked;
             own.set(k, window.grid.from_texels(at.texel), at.t, Vec2::ZERO);
         }
         own
