@@ -1,6 +1,6 @@
 //! The CPU path, one function a stage, in the order and with the names of the report.
 
-use std::ops::Range;
+use std::ops::{Add, Range};
 
 use fearless_simd::{Level, Simd, dispatch};
 use glam::{Vec2, Vec3};
@@ -16,7 +16,7 @@ use crate::functions::Functions;
 use crate::grid::{DepthGrid, PixelGrid};
 use crate::layout::Layout;
 use crate::lookup::BATCH;
-pub use crate::lookup::Lookup;
+pub use crate::lookup::{Lookup, Skipped};
 use crate::maps::{LANES, MapCasters, Target};
 
 /// One window with its functions.
@@ -111,15 +111,14 @@ fn draw_maps(
     grids.iter_mut().for_each(DepthGrid::drawn);
 }
 
-/// `shade.lookup`: V of every pixel that sees a surface, NaN elsewhere. Also how many lookups were answered by where functions
-/// start alone.
-pub fn shade(lookup: &Lookup<'_>, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> u64 {
+/// `shade.lookup`: V of every pixel that sees a surface, NaN elsewhere.
+pub fn shade(lookup: &Lookup<'_>, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Skipped {
     let width = gbuffer.width.max(1) as usize;
     let level = Level::new();
     let rows = visibility.values.par_chunks_mut(width).enumerate();
     // Without vector instructions rounding down is a call.
     rows.map(|(row, values)| dispatch!(level, simd => shade_row(simd, lookup, gbuffer, row * width, values)))
-        .sum()
+        .reduce(Skipped::default, Skipped::add)
 }
 
 #[inline(always)]
@@ -129,29 +128,31 @@ fn shade_row<S: Simd>(
     gbuffer: &GBuffer,
     first: usize,
     values: &mut [f32],
-) -> u64 {
-    let mut lit = 0;
+) -> Skipped {
+    let mut skipped = Skipped::default();
     for (values, first) in values.chunks_mut(BATCH).zip((first..).step_by(BATCH)) {
-        lit += lookup.surfaces(gbuffer, first, values);
+        skipped = skipped + lookup.surfaces(gbuffer, first, values);
     }
-    lit
+    skipped
 }
 
 /// Free points that a task looks up.
 const POINTS: usize = 1024;
 
-/// `shade.lookup` of free points: V, NaN at what is no point. Also how many lookups were answered by where functions start alone.
-pub fn free_points(lookup: &Lookup<'_>, points: &[Vec3], visibility: &mut [f32]) -> u64 {
+/// `shade.lookup` of free points: V, NaN at what is no point.
+pub fn free_points(lookup: &Lookup<'_>, points: &[Vec3], visibility: &mut [f32]) -> Skipped {
     let level = Level::new();
     let tasks = visibility.par_chunks_mut(POINTS).zip(points.par_chunks(POINTS));
-    tasks.map(|(values, points)| dispatch!(level, simd => free_chunk(simd, lookup, points, values))).sum()
+    tasks
+        .map(|(values, points)| dispatch!(level, simd => free_chunk(simd, lookup, points, values)))
+        .reduce(Skipped::default, Skipped::add)
 }
 
 #[inline(always)]
-fn free_chunk<S: Simd>(_simd: S, lookup: &Lookup<'_>, points: &[Vec3], values: &mut [f32]) -> u64 {
-    let mut lit = 0;
+fn free_chunk<S: Simd>(_simd: S, lookup: &Lookup<'_>, points: &[Vec3], values: &mut [f32]) -> Skipped {
+    let mut skipped = Skipped::default();
     for (values, points) in values.chunks_mut(BATCH).zip(points.chunks(BATCH)) {
-        lit += lookup.free_points(points, values);
+        skipped = skipped + lookup.free_points(points, values);
     }
-    lit
+    skipped
 }

@@ -47,6 +47,9 @@ const MOST_OF_ONE_MAP: u32 = 8192;
 /// What reports call receivers that lie before the first node of all functions that they are read from.
 const LIT: &str = "lookups before all shadows";
 
+/// What reports call receivers that face away from all of the light.
+const BELOW: &str = "lookups of what faces away";
+
 /// The technique: settings, from which any number of lights can be prepared.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pdsm {
@@ -293,8 +296,9 @@ impl PreparedPdsm<'_> {
         let mut report = Report::default();
         let gbuffer = self.origin.gbuffer(gbuffer);
         report.time("shade.lookup", |report| {
-            let lit = cpu::shade(&self.lookup(), &gbuffer, visibility);
-            report.skip(LIT, lit);
+            let skipped = cpu::shade(&self.lookup(), &gbuffer, visibility);
+            report.skip(LIT, skipped.lit);
+            report.skip(BELOW, skipped.below);
         });
         report
     }
@@ -313,8 +317,7 @@ impl PreparedPdsm<'_> {
             false => points.iter().map(|&point| self.origin.point(point)).collect(),
         };
         report.time("shade.lookup", |report| {
-            let lit = cpu::free_points(&lookup, &points, visibility);
-            report.skip(LIT, lit);
+            report.skip(LIT, cpu::free_points(&lookup, &points, visibility).lit);
         });
         report
     }

@@ -1,10 +1,11 @@
-//! Leaving rows of maps and lookups before all shadows out never changes an image, bit for bit.
+//! Leaving rows of maps out, and lookups before all shadows and of what faces away, never changes an image, bit for bit.
 
 use gnomon_pdsm::{Pdsm, PdsmParams};
 use scene_core::{VisibilityImage, raster, scenes};
 
 #[test]
 fn skipping_never_changes_the_image() {
+    let mut all_below = 0;
     for spec in ["quads", "ball", "knot", "edges"] {
         let mut setup = scenes::build(spec, 0.0).expect("a built-in scene");
         (setup.camera.width, setup.camera.height) = (96, 72);
@@ -18,11 +19,16 @@ fn skipping_never_changes_the_image() {
                 image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>(),
                 report.skipped["map rows without casters"],
                 shaded.skipped["lookups before all shadows"],
+                shaded.skipped["lookups of what faces away"],
             )
         };
-        let ((with, rows, lit), (without, no_rows, none_lit)) = (shade(true), shade(false));
+        let ((with, rows, lit, below), (without, no_rows, none_lit, none_below)) =
+            (shade(true), shade(false));
         assert!(rows > 0 && no_rows == 0, "{spec}: {rows}");
         assert!(lit > 0 && none_lit == 0, "{spec}: {lit}");
+        assert!(none_below == 0, "{spec}: {none_below}");
         assert_eq!(with, without, "{spec}");
+        all_below += below;
     }
+    assert!(all_below > 0);
 }

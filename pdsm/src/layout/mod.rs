@@ -15,12 +15,14 @@
 
 mod cone;
 mod fit;
+mod placement;
 mod view;
 
 use glam::{DVec3, Mat4, Vec2, Vec3, Vec4};
 use scene_core::geometry::Aabb;
 
 pub use fit::Fit;
+pub(crate) use placement::Placement;
 pub use view::{Part, parts};
 
 /// How distance becomes t.
@@ -96,36 +98,26 @@ impl Layout {
         }
     }
 
-    /// World-space coordinates in the axes.
+    /// What places points on it.
     #[inline(always)]
-    fn local(&self, point: Vec3) -> Vec3 {
-        let p = point - self.origin;
-        Vec3::from_array(self.axes.map(|axis| axis.dot(p)))
+    pub(crate) fn placement(&self) -> Placement {
+        Placement {
+            origin: self.origin,
+            axes: self.axes,
+            depth: self.depth,
+            corner: self.corner,
+            texels_per_unit: self.texels_per_unit,
+            max_tan: self.max_tan,
+            reach: self.reach,
+            part: self.part,
+        }
     }
 
     /// Where `point` lies; `None` if this window is not the one that looks at it.
     #[inline]
     pub fn locate(&self, point: Vec3) -> Option<WindowPoint> {
-        let (at, belongs) = self.place(point);
+        let (at, belongs) = self.placement().place(point);
         belongs.then_some(at)
-    }
-
-    /// Where `point` lies, and whether this window is the one that looks at it: [`locate`](Self::locate) without branches, for
-    /// many at once.
-    #[inline(always)]
-    pub(crate) fn place(&self, point: Vec3) -> (WindowPoint, bool) {
-        let local = self.local(point);
-        let (at, before) = self.place_local(local);
-        let farthest = self.max_tan * local.z;
-        let mut belongs = before;
-        if matches!(self.depth, Depth::Central { .. }) {
-            belongs &= (local.x.abs() <= farthest) & (local.y.abs() <= farthest);
-        }
-        if let Some(Held { bounds, texels: [low, high] }) = self.part {
-            belongs &= (bounds.min.cmple(point) & bounds.max.cmpge(point)).all();
-            belongs &= (low.cmple(at.texel) & high.cmpge(at.texel)).all();
-        }
-        (at, belongs)
     }
 
     /// Whether it is fitted to a part of a scene.
@@ -137,7 +129,7 @@ impl Layout {
     pub fn texel_area(&self, point: Vec3) -> f32 {
         let on_window = (self.texels_per_unit.x * self.texels_per_unit.y).recip();
         match self.depth {
-            Depth::Central { focus } => on_window * (self.local(point).z / focus).powi(2),
+            Depth::Central { focus } => on_window * (self.placement().local(point).z / focus).powi(2),
             Depth::Parallel { .. } => on_window,
         }
     }
@@ -145,76 +137,31 @@ impl Layout {
     /// Where `point` lies, also if another window looks at it; `None` on and behind the light's plane.
     #[inline]
     pub fn project(&self, point: Vec3) -> Option<WindowPoint> {
-        self.project_local(self.local(point))
-    }
-
-    #[inline]
-    fn project_local(&self, local: Vec3) -> Option<WindowPoint> {
-        let (at, before) = self.place_local(local);
+        let placement = self.placement();
+        let (at, before) = placement.place_local(placement.local(point));
         before.then_some(at)
     }
 
-    /// Where a point lies, and whether it is before the light's plane.
-    #[inline(always)]
-    fn place_local(&self, local: Vec3) -> (WindowPoint, bool) {
-        let (on_window, t, before) = match self.depth {
-            Depth::Central { focus } => {
-                let scale = focus / local.z;
-                (local.truncate() * scale, 1.0 - scale, local.z > 0.0)
-            }
-            Depth::Parallel { focus, per_unit } => (local.truncate(), (local.z - focus) * per_unit, true),
-        };
-        (WindowPoint { texel: (on_window - self.corner) * self.texels_per_unit, t }, before)
-    }
-
     /// How t changes along the plane through `point` with unit normal `normal`: per texel of the window, and per unit
-    /// that the plane is moved along its normal.
-    ///
-    /// The plane N·X = h has 1/z = (N.xy·q/F + N.z)/h, so t = 1 − (N.xy·q + N.z·F)/h is linear in q; in parallel light
-    /// z = (h − N.xy·q)/N.z. Infinite where the plane holds the light's middle.
+    /// that the plane is moved along its normal. Infinite where the plane holds the light's middle.
     #[inline(always)]
     pub fn plane_slope(&self, point: Vec3, normal: Vec3, t: f32) -> (Vec2, f32) {
-        let n = Vec3::from_array(self.axes.map(|axis| axis.dot(normal)));
-        match self.depth {
-            Depth::Central { .. } => {
-                let h = normal.dot(point - self.origin);
-                (-n.truncate() / (h * self.texels_per_unit), ((1.0 - t) / h).abs())
-            }
-            Depth::Parallel { per_unit, .. } => {
-                let scale = per_unit / n.z;
-                (-n.truncate() * scale / self.texels_per_unit, scale.abs())
-            }
-        }
+        self.placement().plane_slope(point, normal, t)
     }
 
     /// The share of the samples that lie above the plane through `point` with unit normal `normal`.
     #[inline]
     pub fn share_above(&self, point: Vec3, normal: Vec3) -> f32 {
         // Mostly the plane does not cut the light.
-        if self.is_above(point, normal) {
-            return 1.0;
+        let placement = self.placement();
+        match placement.sides(point, normal) {
+            [true, _] => return 1.0,
+            [_, true] => return 0.0,
+            _ => {}
         }
-        let (n, sign, middle) = self.height_of_light(point, normal);
+        let (n, sign, middle) = placement.height_of_light(point, normal);
         let above = self.offsets.iter().filter(|&&a| middle + sign * n.truncate().dot(a) > 0.0).count();
         above as f32 / self.offsets.len().max(1) as f32
-    }
-
-    /// Whether all samples lie above the plane: false in doubt.
-    #[inline(always)]
-    pub(crate) fn is_above(&self, point: Vec3, normal: Vec3) -> bool {
-        let (n, _, middle) = self.height_of_light(point, normal);
-        middle > n.truncate().abs().dot(self.reach)
-    }
-
-    /// The normal in the axes, the sign of a sample's offset, and how high the light's middle is above the plane:
-    /// N·(C + a − P) for a place, −N·(n + a) for a direction of travel.
-    #[inline(always)]
-    fn height_of_light(&self, point: Vec3, normal: Vec3) -> (Vec3, f32, f32) {
-        let n = Vec3::from_array(self.axes.map(|axis| axis.dot(normal)));
-        match self.depth {
-            Depth::Central { .. } => (n, 1.0, normal.dot(self.origin - point)),
-            Depth::Parallel { .. } => (n, -1.0, -n.z),
-        }
     }
 
     /// The projection of the map of the sample with step `step`: a texel's x and y in clip space, and reversed depth.

@@ -1,12 +1,14 @@
-//! Lookups of many receivers side by side (algorithm 2), four functions each.
+//! Lookups of many receivers side by side (algorithm 2), one function each or four.
 //!
 //! Receivers are looked up [`BATCH`] at a time, stage by stage: where they lie on a window ([`places`]), which of them lie
-//! before the start of all four functions, where the others' nodes are ([`four`]). What is arithmetic is done for a vector of
+//! before the start of all their functions, where the others' nodes are ([`reads`]). What is arithmetic is done for a vector of
 //! them at once; what waits for memory does not depend on another such wait of its stage, so that the processor waits for
 //! many of them at once. V is what one lookup after the other gives, bit for bit.
 
-mod four;
 mod places;
+mod reads;
+
+use std::ops::Add;
 
 use glam::{Vec2, Vec3};
 use gnomon_shadow_map::receiver_plane::view_tolerance;
@@ -15,8 +17,8 @@ use scene_core::{GBuffer, Light, Scene};
 use crate::cpu::Window;
 use crate::functions::Functions;
 use crate::maps::POSITION_ERROR;
-use four::interpolate;
 use places::{Places, Points};
+use reads::{interpolate, nearest};
 
 /// Receivers that are looked up side by side.
 pub(crate) const BATCH: usize = 32;
@@ -39,8 +41,25 @@ pub struct Lookup<'a> {
     pub tolerance: f32,
     /// Pixels that interpolation reaches along each axis: 1 reads four pixels, 0 the nearest one.
     pub radius: u32,
-    /// Whether what lies before the start of all functions is answered by that alone.
+    /// Whether functions are left out that change nothing: see [`Skipped`].
     pub skip: bool,
+}
+
+/// Lookups that read no function.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Skipped {
+    /// Of receivers that lie before the start of all functions that they would be read from.
+    pub lit: u64,
+    /// Of receivers whose plane has none of the light above it.
+    pub below: u64,
+}
+
+impl Add for Skipped {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { lit: self.lit + other.lit, below: self.below + other.below }
+    }
 }
 
 /// Half the diagonal way from a texel's middle to its corner, in texels along each axis, and what the drawing of maps
@@ -60,8 +79,7 @@ pub(crate) fn read_before(slope: Vec2) -> f32 {
 }
 
 impl Lookup<'_> {
-    /// `shade.lookup` of at most [`BATCH`] pixels of the G-buffer from `first` on: V, NaN where no surface is seen. How many
-    /// lookups were answered by where functions start alone.
+    /// `shade.lookup` of at most [`BATCH`] pixels of the G-buffer from `first` on: V, NaN where no surface is seen.
     ///
     /// A function is read before the receiver's own surface, by what that surface can differ within a texel. On its
     /// plane t changes by g a texel of the window. In the map of a sample with step D a ray at t − b lies where the
@@ -71,7 +89,7 @@ impl Lookup<'_> {
     ///
     /// Four pixels are read each where its own ray meets the receiver's plane.
     #[inline(always)]
-    pub(crate) fn surfaces(&self, gbuffer: &GBuffer, first: usize, values: &mut [f32]) -> u64 {
+    pub(crate) fn surfaces(&self, gbuffer: &GBuffer, first: usize, values: &mut [f32]) -> Skipped {
         let objects = self.scene.objects();
         let is_cone = matches!(self.light, Light::Spot { .. });
         let mut asked = [false; BATCH];
@@ -88,7 +106,7 @@ impl Lookup<'_> {
             };
         }
         if asked == [false; BATCH] {
-            return 0;
+            return Skipped::default();
         }
         let seen = first..first + values.len();
         let position = Points::new(&gbuffer.position[seen.clone()]);
@@ -98,23 +116,23 @@ impl Lookup<'_> {
             *tolerance += view_tolerance(depth);
         }
         // Which part of the light still and moving casters hide is not known: the product takes the parts to be independent.
-        let mut lit = 0;
+        let mut skipped = Skipped::default();
         for windows in [self.windows, self.moving] {
             let mut waiting = asked;
             for window in windows {
-                let places = Places::of_surfaces(window, &position, &normal, &tolerance, &waiting);
-                lit += self.multiply(window, &places, values);
+                let places = Places::of_surfaces(window, &position, &normal, &tolerance, &waiting, self.skip);
+                skipped = skipped + self.multiply(window, &places, values);
                 if places.take_from(&mut waiting) {
                     break;
                 }
             }
         }
-        lit
+        skipped
     }
 
     /// V at at most [`BATCH`] free points, which have no surface of their own; NaN at what is no point.
     #[inline(always)]
-    pub(crate) fn free_points(&self, points: &[Vec3], values: &mut [f32]) -> u64 {
+    pub(crate) fn free_points(&self, points: &[Vec3], values: &mut [f32]) -> Skipped {
         let mut asked = [false; BATCH];
         for ((value, asked), &point) in values.iter_mut().zip(&mut asked).zip(points) {
             *value = if !point.is_finite() {
@@ -129,32 +147,34 @@ impl Lookup<'_> {
         let position = Points::new(points);
         // Windows of parts come first, and answer for surfaces alone.
         let parts = self.windows.partition_point(|window| window.layout.is_of_part());
-        let mut lit = 0;
+        let mut skipped = Skipped::default();
         for windows in [&self.windows[parts..], self.moving] {
             let mut waiting = asked;
             for window in windows {
                 let places = Places::of_points(window, &position, &waiting);
-                lit += self.multiply(window, &places, values);
+                skipped = skipped + self.multiply(window, &places, values);
                 if places.take_from(&mut waiting) {
                     break;
                 }
             }
         }
-        lit
+        skipped
     }
 
     /// Multiplies V of the receivers that lie on `window` by what it says of them.
     #[inline(always)]
-    fn multiply(&self, window: &Window, places: &Places, values: &mut [f32]) -> u64 {
+    fn multiply(&self, window: &Window, places: &Places, values: &mut [f32]) -> Skipped {
         let functions = &window.functions;
         let mut found = [1.0; BATCH];
-        let lit = if self.radius == 1 {
-            interpolate(functions, places, self.skip, &mut found)
-        } else {
-            for (k, found) in found.iter_mut().enumerate().filter(|&(k, _)| places.is_read[k]) {
-                *found = places.look_up(k, functions, self.radius);
+        let lit = match self.radius {
+            0 => nearest(functions, places, self.skip, &mut found),
+            1 => interpolate(functions, places, self.skip, &mut found),
+            _ => {
+                for (k, found) in found.iter_mut().enumerate().filter(|&(k, _)| places.is_read[k]) {
+                    *found = places.filter(k, functions, self.radius);
+                }
+                0
             }
-            0
         };
         for (k, value) in values.iter_mut().enumerate() {
             let visibility = found[k];
@@ -162,29 +182,27 @@ impl Lookup<'_> {
                 1.0
             } else if places.is_above[k] || (places.is_read[k] && visibility == 0.0) {
                 visibility
+            } else if places.is_below[k] {
+                0.0
             } else {
                 // Where it is not read, the plane holds the light's middle: half of the light is below it at best.
                 visibility.min(places.share_above(k, window))
             };
         }
-        lit
+        let below = if self.skip { places.below() } else { 0 };
+        Skipped { lit, below }
     }
 }
 
 impl Places {
-    /// Of the nearest pixel, or with a tent over 4·radius² pixels, weights along an axis summing to the radius. Each pixel is
+    /// V of a place, with a tent over 4·radius² pixels, weights along an axis summing to the radius. Each pixel is
     /// read where its own ray meets the receiver's plane, so that a wide filter shadows no more of a plane than a narrow one.
-    fn look_up(&self, k: usize, functions: &Functions, radius: u32) -> f32 {
+    fn filter(&self, k: usize, functions: &Functions, radius: u32) -> f32 {
         if !self.is_near(k) {
             return 1.0;
         }
         let pixel = Vec2::new(self.pixel[0][k], self.pixel[1][k]);
         let slope = Vec2::new(self.slope[0][k], self.slope[1][k]);
-        let read =
-            |at: Vec2| functions.visibility(at.x as i32, at.y as i32, self.t[k] + slope.dot(at - pixel));
-        if radius == 0 {
-            return read(pixel.round());
-        }
         let reach = radius as f32;
         let first = pixel.floor() - (reach - 1.0);
         let mut sum = 0.0;
@@ -192,7 +210,8 @@ impl Places {
             for column in 0..2 * radius {
                 let at = first + Vec2::new(column as f32, row as f32);
                 let weight = 1.0 - (at - pixel).abs() / reach;
-                sum += weight.x * weight.y * read(at);
+                let t = self.t[k] + slope.dot(at - pixel);
+                sum += weight.x * weight.y * functions.visibility(at.x as i32, at.y as i32, t);
             }
         }
         (sum / (reach * reach)).clamp(0.0, 1.0)

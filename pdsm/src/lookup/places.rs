@@ -5,6 +5,7 @@ use glam::{Vec2, Vec3};
 
 use super::{BATCH, Lanes, T_ERROR, read_before};
 use crate::cpu::Window;
+use crate::layout::Placement;
 
 /// Points or directions of a batch; zero beyond its end.
 pub(super) struct Points([Lanes<f32>; 3]);
@@ -35,6 +36,8 @@ pub(super) struct Places {
     pub(super) is_read: Lanes<bool>,
     /// Whether all of the light is above the receiver's plane; of what has no plane, too.
     pub(super) is_above: Lanes<bool>,
+    /// Whether none of it is.
+    pub(super) is_below: Lanes<bool>,
     /// Position on the PDSM, in pixels.
     pub(super) pixel: [Lanes<f32>; 2],
     /// Depth there.
@@ -52,6 +55,7 @@ impl Places {
             belongs: [false; BATCH],
             is_read: [false; BATCH],
             is_above: [true; BATCH],
+            is_below: [false; BATCH],
             pixel: [[0.0; BATCH]; 2],
             t: [0.0; BATCH],
             slope: [[0.0; BATCH]; 2],
@@ -59,7 +63,8 @@ impl Places {
         }
     }
 
-    /// Of surfaces, which are read before themselves: see [`super::Lookup::surfaces`].
+    /// Of surfaces, which are read before themselves: see [`super::Lookup::surfaces`]. Those that face away from all of the
+    /// light are not read if `skip` lets them be left out.
     #[inline(always)]
     pub(super) fn of_surfaces(
         window: &Window,
@@ -67,21 +72,30 @@ impl Places {
         normal: &Points,
         tolerance: &Lanes<f32>,
         asked: &Lanes<bool>,
+        skip: bool,
     ) -> Self {
         let mut own = Self { surfaces: [position.0, normal.0], ..Self::new() };
-        let (layout, grid) = (&window.layout, window.grid);
+        let grid = window.grid;
         let node_error = window.functions.nodes().depth_error();
-        for k in 0..BATCH {
-            let (receiver, normal) = (position.get(k), normal.get(k));
-            let (at, belongs) = layout.place(receiver);
-            let (slope, lift) = layout.plane_slope(receiver, normal, at.t);
-            let rounding = tolerance[k] * lift + T_ERROR * (at.t.abs() + (1.0 - at.t).abs()) + node_error;
-            let before = at.t - read_before(slope) - rounding;
-            own.belongs[k] = belongs & asked[k];
-            own.is_read[k] = belongs & asked[k] & before.is_finite();
-            own.is_above[k] = layout.is_above(receiver, normal) & before.is_finite();
-            own.set(k, grid.from_texels(at.texel), before, slope * grid.ratio as f32);
-        }
+        window.layout.placement().of_known_kind(
+            #[inline(always)]
+            |placement: Placement| {
+                for k in 0..BATCH {
+                    let (receiver, normal) = (position.get(k), normal.get(k));
+                    let (at, belongs) = placement.place(receiver);
+                    let (slope, lift) = placement.plane_slope(receiver, normal, at.t);
+                    let rounding =
+                        tolerance[k] * lift + T_ERROR * (at.t.abs() + (1.0 - at.t).abs()) + node_error;
+                    let before = at.t - read_before(slope) - rounding;
+                    let [above, below] = placement.sides(receiver, normal);
+                    own.belongs[k] = belongs & asked[k];
+                    own.is_read[k] = belongs & asked[k] & before.is_finite() & !(below & skip);
+                    own.is_above[k] = above & before.is_finite();
+                    own.is_below[k] = below;
+                    own.set(k, grid.from_texels(at.texel), before, slope * grid.ratio as f32);
+                }
+            },
+        );
         own
     }
 
@@ -89,12 +103,18 @@ impl Places {
     #[inline(always)]
     pub(super) fn of_points(window: &Window, points: &Points, asked: &Lanes<bool>) -> Self {
         let mut own = Self::new();
-        for (k, &asked) in asked.iter().enumerate() {
-            let (at, belongs) = window.layout.place(points.get(k));
-            own.belongs[k] = belongs & asked;
-            own.is_read[k] = belongs & asked;
-            own.set(k, window.grid.from_texels(at.texel), at.t, Vec2::ZERO);
-        }
+        let grid = window.grid;
+        window.layout.placement().of_known_kind(
+            #[inline(always)]
+            |placement: Placement| {
+                for (k, &asked) in asked.iter().enumerate() {
+                    let (at, belongs) = placement.place(points.get(k));
+                    own.belongs[k] = belongs & asked;
+                    own.is_read[k] = belongs & asked;
+                    own.set(k, grid.from_texels(at.texel), at.t, Vec2::ZERO);
+                }
+            },
+        );
         own
     }
 
@@ -119,6 +139,16 @@ impl Places {
         let [receiver, normal] = &self.surfaces;
         let get = |of: &[Lanes<f32>; 3]| Vec3::new(of[0][k], of[1][k], of[2][k]);
         window.layout.share_above(get(receiver), get(normal))
+    }
+
+    /// How many this window looks at face away from all of the light.
+    #[inline(always)]
+    pub(super) fn below(&self) -> u64 {
+        let mut count = 0u32;
+        for (&belongs, &is_below) in self.belongs.iter().zip(&self.is_below) {
+            count += u32::from(belongs & is_below);
+        }
+        u64::from(count)
     }
 
     /// Leaves those waiting that this window does not look at; whether none are.
