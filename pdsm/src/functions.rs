@@ -103,10 +103,17 @@ impl Functions {
             places.push(place);
             rest = after;
         }
-        places.into_par_iter().zip(&strips).for_each(|(place, strip)| place.copy_from_slice(&strip.nodes));
         functions.index.push(start);
+        let mut guide = Guide::with_room(size, start as usize);
+        let rows = if strips.is_empty() { 1 } else { layout.strip_rows(0) };
+        let parts = guide.parts(size, rows, &functions.index);
+        places.into_par_iter().zip(&strips).zip(parts).for_each(|((place, strip), part)| {
+            place.copy_from_slice(&strip.nodes);
+            part.fill(|node| strip.nodes[node]);
+        });
+        functions.guide = guide;
         functions.nodes = Nodes::Full(nodes);
-        functions.guided()
+        functions
     }
 
     /// Functions that were kept as they lie in memory. `None` unless there are `size`² + 1 entries of the index, ascending

@@ -24,6 +24,9 @@ pub(crate) const RIM: i32 = 2;
 /// to read as what they save.
 const MOST_STARTS: usize = 1 << 22;
 
+/// Rows of functions a task, where a guide is made of all of them at once.
+const ROWS: u32 = 16;
+
 /// See the module.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Guide {
@@ -33,31 +36,72 @@ pub(crate) struct Guide {
     starts: Vec<f32>,
 }
 
+/// What a guide holds of some rows of functions.
+pub(crate) struct Part<'a> {
+    every: &'a mut [f32],
+    /// Whole rows, with their rims; none where starts are not kept.
+    starts: &'a mut [f32],
+    /// Where nodes of these functions start, and their end.
+    index: &'a [u32],
+    size: u32,
+}
+
+impl Part<'_> {
+    /// `node` yields the nodes of these functions, counted from the first of them.
+    pub(crate) fn fill(self, node: impl Fn(usize) -> Node) {
+        let size = self.size as usize;
+        let Some(&first) = self.index.first() else { return };
+        let own = first.div_ceil(GROUP as u32) as usize;
+        for (group, t) in (own..).zip(self.every) {
+            *t = node(GROUP * group - first as usize).t;
+        }
+        let rows = self.index.windows(size + 1).step_by(size.max(1));
+        for (starts, index) in self.starts.chunks_mut(Guide::side(self.size)).zip(rows) {
+            for (start, range) in starts[RIM as usize..].iter_mut().zip(index.windows(2)) {
+                if range[0] < range[1] {
+                    *start = node((range[0] - first) as usize).t;
+                }
+            }
+        }
+    }
+}
+
 impl Guide {
     pub(crate) fn new(size: u32, index: &[u32], nodes: &Nodes) -> Self {
-        let groups = nodes.len().div_ceil(GROUP);
-        let mut every = vec![0.0; groups + AT_ONCE];
-        every[..groups]
-            .par_iter_mut()
-            .with_min_len(4096)
-            .enumerate()
-            .for_each(|(group, t)| *t = nodes.get(GROUP * group).t);
+        let mut guide = Self::with_room(size, nodes.len());
+        guide.parts(size, ROWS, index).into_par_iter().for_each(|part| {
+            let first = part.index[0] as usize;
+            part.fill(|node| nodes.get(first + node));
+        });
+        guide
+    }
+
+    /// With nothing in it yet.
+    pub(crate) fn with_room(size: u32, nodes: usize) -> Self {
         let side = Self::side(size);
-        let mut starts = Vec::new();
-        if side * side <= MOST_STARTS {
-            starts.resize(side * side, f32::INFINITY);
-            let (rim, size) = (RIM as usize, size as usize);
-            let rows = starts.par_chunks_mut(side).skip(rim).take(size).zip(index.par_chunks(size.max(1)));
-            rows.enumerate().for_each(|(row, (starts, begins))| {
-                let end = |column: usize| index[row * size + column + 1];
-                for (column, (start, &begin)) in starts[rim..].iter_mut().zip(begins).enumerate().take(size) {
-                    if begin < end(column) {
-                        *start = nodes.get(begin as usize).t;
-                    }
-                }
-            });
-        }
-        Self { every, starts }
+        let starts = if side * side <= MOST_STARTS { vec![f32::INFINITY; side * side] } else { Vec::new() };
+        Self { every: vec![0.0; nodes.div_ceil(GROUP) + AT_ONCE], starts }
+    }
+
+    /// What there is to fill, `rows` rows of functions each.
+    pub(crate) fn parts<'a>(&'a mut self, size: u32, rows: u32, index: &'a [u32]) -> Vec<Part<'a>> {
+        let side = Self::side(size);
+        let mut every = self.every.as_mut_slice();
+        let mut starts = self.starts.get_mut(RIM as usize * side..).unwrap_or_default();
+        let part = |first: u32| {
+            let rows = rows.max(1).min(size - first) as usize;
+            let place = first as usize * size as usize;
+            let index = &index[place..=place + rows * size as usize];
+            let groups = |node: u32| node.div_ceil(GROUP as u32) as usize;
+            let here = groups(index[index.len() - 1]) - groups(index[0]);
+            let (own, rest) = std::mem::take(&mut every).split_at_mut(here);
+            every = rest;
+            let wide = (rows * side).min(starts.len());
+            let (own_starts, rest) = std::mem::take(&mut starts).split_at_mut(wide);
+            starts = rest;
+            Part { every: own, starts: own_starts, index, size }
+        };
+        (0..size).step_by(rows.max(1) as usize).map(part).collect()
     }
 
     /// Pixels a row of the starts.
@@ -140,4 +184,37 @@ pub(crate) fn evaluate_in<N: Copy>(
     let b = node(nodes[(place + 1).min(end - 1)]);
     let share = if place + 1 < end { (t - a.t) / (b.t - a.t) } else { 0.0 };
     (a.visibility + (b.visibility - a.visibility) * share).clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// However many rows its parts have, it holds t of every eighth node and of each function's first.
+        #[test]
+        fn parts_are_the_whole(counts in prop::collection::vec(0u32..40, 25), rows in 1u32..7) {
+            let mut index = vec![0];
+            index.extend(counts.iter().scan(0, |sum, count| { *sum += count; Some(*sum) }));
+            let nodes: Vec<_> = (0..index[25]).map(|t| Node { t: t as f32, visibility: 1.0 }).collect();
+            let mut guide = Guide::with_room(5, nodes.len());
+            for part in guide.parts(5, rows, &index) {
+                let first = part.index[0] as usize;
+                part.fill(|node| nodes[first + node]);
+            }
+            for (group, nodes) in nodes.chunks(GROUP).enumerate() {
+                prop_assert_eq!(guide.every[group], nodes[0].t);
+            }
+            for (place, &start) in guide.starts.iter().enumerate() {
+                let (x, y) = ((place % 9) as i32 - RIM, (place / 9) as i32 - RIM);
+                let is_inside = (0..5).contains(&x) && (0..5).contains(&y);
+                let pixel = if is_inside { (5 * y + x) as usize } else { 0 };
+                let has_nodes = is_inside && counts[pixel] > 0;
+                prop_assert_eq!(start, if has_nodes { index[pixel] as f32 } else { f32::INFINITY });
+            }
+            prop_assert_eq!(guide, Guide::new(5, &index, &Nodes::Full(nodes)));
+        }
+    }
 }
