@@ -49,7 +49,7 @@ pub struct PdsmParams {
     pub error_measure: ErrorMeasure,
     /// Which segments the functions consist of: `fewest` takes longer to build and gives shorter ones, as files should hold.
     pub segments: Segments,
-    /// Interpolate between the four nearest pixels; off reads the nearest one, and costs a quarter.
+    /// Interpolate between the four nearest pixels; off reads the nearest one, at a little more than half the cost.
     pub bilinear: bool,
     /// Pixels from which interpolation reaches a point, along each axis: 1 is bilinear, more soften shadows further, at a
     /// cost of 4·`filter_radius`² pixels.

@@ -51,7 +51,8 @@ impl Reads<4> {
     /// The square of four pixels that a place lies in, and how far it lies from the first of them.
     #[inline(always)]
     fn around(functions: &Functions, places: &Places) -> (Self, [Lanes<f32>; 2]) {
-        let (mut reads, mut weights) = (Self::new(), [[0.0; BATCH]; 2]);
+        let mut reads = Self::new();
+        let (mut right, mut down) = ([0.0; BATCH], [0.0; BATCH]);
         for k in 0..BATCH {
             let [x, y] = [places.pixel[0][k], places.pixel[1][k]];
             let is_read = places.is_read[k] & places.is_near(k);
@@ -59,8 +60,8 @@ impl Reads<4> {
             let (to_x, to_y) = (x - column, y - row);
             let [dx, dy] = [places.slope[0][k], places.slope[1][k]];
             let first = places.t[k] - (dx * to_x + dy * to_y);
-            weights[0][k] = if is_read { to_x } else { 0.0 };
-            weights[1][k] = if is_read { to_y } else { 0.0 };
+            right[k] = if is_read { to_x } else { 0.0 };
+            down[k] = if is_read { to_y } else { 0.0 };
             reads.depths[0][k] = first;
             reads.depths[1][k] = first + dx;
             reads.depths[2][k] = first + dy;
@@ -68,7 +69,7 @@ impl Reads<4> {
             reads.columns[k] = beside(column, is_read, functions);
             reads.rows[k] = beside(row, is_read, functions);
         }
-        (reads, weights)
+        (reads, [right, down])
     }
 }
 
