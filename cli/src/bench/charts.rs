@@ -234,10 +234,19 @@ impl Drawing {
         chart.draw_series(LineSeries::new(steps, BLACK.mix(0.35).stroke_width(1))).map_err(|e| fault(&e))?;
         let rings = self.front.iter().map(|(x, y, _)| Circle::new((*x, *y), 7, BLACK.stroke_width(1)));
         chart.draw_series(rings).map_err(|e| fault(&e))?;
-        let names = self.front.iter().filter(|(_, _, name)| !name.starts_with("rays")).map(|(x, y, name)| {
-            EmptyElement::at((*x, *y)) + Text::new(name.clone(), (9, -16), ("sans-serif", 14))
-        });
-        chart.draw_series(names).map_err(|e| fault(&e))?;
+        let style = TextStyle::from(("sans-serif", 14).into_font());
+        // Names keep clear of rings, too.
+        let ring = |(x, y): (i32, i32)| [x - 7, y - 7, x + 7, y + 7];
+        let mut taken: Vec<_> =
+            self.front.iter().map(|(x, y, _)| ring(chart.backend_coord(&(*x, *y)))).collect();
+        for (x, y, name) in self.front.iter().filter(|(_, _, name)| !name.starts_with("rays")) {
+            let at = chart.backend_coord(&(*x, *y));
+            let size = left.estimate_text_size(name, &style).map_err(|e| fault(&e))?;
+            if let Some(offset) = free_place(at, size, &mut taken) {
+                let text = EmptyElement::at((*x, *y)) + Text::new(name.clone(), offset, style.clone());
+                chart.draw_series([text]).map_err(|e| fault(&e))?;
+            }
+        }
         let named = self.series.iter().filter(|series| !series.points.is_empty());
         for (row, series) in (0..).zip(named) {
             let y = 60 + 24 * row;
@@ -259,6 +268,23 @@ impl Drawing {
     }
 }
 
+/// Offset of a name of this size from its point, in pixels: above or below it, where it covers nothing that is `taken`. A name without a place is
+/// left out; the table has it.
+fn free_place(at: (i32, i32), size: (u32, u32), taken: &mut Vec<[i32; 4]>) -> Option<(i32, i32)> {
+    let [width, height] = [size.0, size.1].map(|side| i32::try_from(side).unwrap_or(i32::MAX / 4));
+    [(9, -16), (9, 4)].into_iter().find(|(dx, dy)| {
+        let [left, top] = [at.0 + dx, at.1 + dy];
+        let own = [left, top, left + width, top + height];
+        let is_free = taken.iter().all(|other| {
+            own[2] <= other[0] || other[2] <= own[0] || own[3] <= other[1] || other[3] <= own[1]
+        });
+        if is_free {
+            taken.push(own);
+        }
+        is_free
+    })
+}
+
 /// 1000000 → "1000000", 0.0123 → "0.0123": no more digits than needed.
 fn number(value: f64) -> String {
     if value >= 1e5 { format!("{value:.0e}") } else { format!("{}", (value * 1e6).round() / 1e6) }
@@ -269,6 +295,17 @@ mod tests {
     use super::super::front::places;
     use super::super::record::tests::record;
     use super::*;
+
+    #[test]
+    fn names_do_not_cover_each_other() {
+        let mut taken = Vec::new();
+        assert_eq!(free_place((100, 100), (50, 14), &mut taken), Some((9, -16)));
+        // Too near above, free below; then neither; then farther off.
+        assert_eq!(free_place((120, 102), (50, 14), &mut taken), Some((9, 4)));
+        assert_eq!(free_place((110, 101), (50, 14), &mut taken), None);
+        assert_eq!(free_place((200, 101), (50, 14), &mut taken), Some((9, -16)));
+        assert_eq!(taken.len(), 3);
+    }
 
     #[test]
     fn a_chart_names_its_front_and_nothing_makes_none() {
