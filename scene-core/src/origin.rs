@@ -102,7 +102,9 @@ impl Origin {
     /// A G-buffer counted from here, in world space again.
     #[must_use]
     pub fn back(self, mut gbuffer: GBuffer) -> GBuffer {
-        gbuffer.position.iter_mut().for_each(|position| *position += self.place);
+        if !self.is_world() {
+            gbuffer.position.iter_mut().for_each(|position| *position += self.place);
+        }
         gbuffer
     }
 }

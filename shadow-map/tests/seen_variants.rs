@@ -5,6 +5,7 @@ use gnomon_shadow_map::{ShadowMap, ShadowMapParams, Variant};
 use scene_core::bvh::Bvh;
 use scene_core::geometry::ObjectFlags;
 use scene_core::reference::{ReferenceSettings, no_progress, reference, valid_pixels};
+use scene_core::technique::conformance;
 use scene_core::{
     Camera, GBuffer, Light, Report, Scene, TriangleMesh, VisibilityImage, metrics, raster, scenes,
 };
@@ -165,16 +166,6 @@ fn cascades_follow_what_is_seen() {
 /// Nothing, a point, a line, and coordinates at the end of f32's range: an answer for each pixel that sees a surface.
 #[test]
 fn scenes_without_area_are_answered() {
-    let camera = Camera {
-        eye: Vec3::new(0.0, 2.0, 4.0),
-        target: Vec3::ZERO,
-        up: Vec3::Y,
-        fov_y: 0.8,
-        near: 0.01,
-        far: 100.0,
-        width: 33,
-        height: 17,
-    };
     let lights = [
         Light::Directional { direction: Vec3::NEG_Y, angular_radius: 0.02 },
         Light::Point { position: Vec3::ZERO },
@@ -190,11 +181,8 @@ fn scenes_without_area_are_answered() {
         [x * 1e30, Vec3::Z * 1e30, -x * 1e30],
         [x * 1e-30, Vec3::Z * 1e-30, -x * 1e-30],
     ] {
-        let mut scene = Scene::new();
-        let mesh = TriangleMesh::new("t", corners.to_vec(), vec![[0, 1, 2]]);
-        scene.add(&mesh, Affine3A::IDENTITY, ObjectFlags::default()).expect("finite");
-        for scene in [scene, Scene::new()] {
-            let gbuffer = raster::render_gbuffer(&scene, &camera);
+        for scene in [conformance::triangle(corners), Scene::new()] {
+            let gbuffer = raster::render_gbuffer(&scene, &conformance::CAMERA);
             for (variant, light) in VARIANTS.iter().flat_map(|v| lights.iter().map(move |l| (*v, l))) {
                 let params = ShadowMapParams { variant, map_size: 32, views: 3, ..Default::default() };
                 let (image, _) = shade(&scene, light, &gbuffer, params);
