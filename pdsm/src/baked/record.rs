@@ -9,7 +9,7 @@ use crate::compression::Segments;
 use crate::cpu::Window;
 use crate::functions::{Functions, Statistics};
 use crate::grid::PixelGrid;
-use crate::layout::{Depth, Layout};
+use crate::layout::{Depth, Layout, Placement};
 use crate::nodes::{DepthSteps, Nodes};
 use crate::params::{ErrorMeasure, PdsmParams, Precision};
 
@@ -135,19 +135,19 @@ fn read_light(from: &mut Reader<'_>) -> Option<Light> {
 }
 
 fn write_window(window: &Window, to: &mut Writer) {
-    let Layout { origin, axes, depth, corner, texels_per_unit, map_size: _, max_tan, caster_range, .. } =
-        &window.layout;
+    let Placement { origin, axes, depth, corner, texels_per_unit, max_tan, reach, part: _ } =
+        &window.layout.placement;
     to.f32s(&origin.to_array());
     to.f32s(bytemuck::cast_slice(axes));
     match *depth {
         Depth::Central { focus } => to.f32s(&[focus, 0.0]),
         Depth::Parallel { focus, per_unit } => to.f32s(&[focus, per_unit]),
     }
-    for vector in [*corner, *texels_per_unit, window.layout.reach] {
+    for vector in [*corner, *texels_per_unit, *reach] {
         to.f32s(&vector.to_array());
     }
     to.f32s(&[*max_tan]);
-    caster_range.iter().for_each(|&z| to.f64(z));
+    window.layout.caster_range.iter().for_each(|&z| to.f64(z));
     to.u32(window.layout.offsets.len() as u32);
     to.f32s(bytemuck::cast_slice(&window.layout.offsets));
     to.u32(window.grid.size);
@@ -202,18 +202,7 @@ fn read_window(from: &mut Reader<'_>) -> Option<Window> {
         Some(steps) => Nodes::Packed(bytemuck::cast_slice(from.take(count)?).to_vec(), steps),
     };
     let functions = Functions::from_parts(grid.size, index, nodes, statistics)?;
-    let layout = Layout {
-        origin,
-        axes,
-        depth,
-        corner,
-        texels_per_unit,
-        map_size,
-        max_tan,
-        caster_range,
-        offsets,
-        reach,
-        part: None,
-    };
+    let placement = Placement { origin, axes, depth, corner, texels_per_unit, max_tan, reach, part: None };
+    let layout = Layout { placement, map_size, caster_range, offsets };
     Some(Window { layout, grid, functions })
 }

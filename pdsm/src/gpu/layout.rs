@@ -80,8 +80,8 @@ impl WindowUniform {
     /// and its nodes `first_word` words.
     pub fn new(window: &Window, first_index: u32, first_offset: u32, first_word: u32) -> Self {
         let layout = &window.layout;
-        let [x, y, z] = layout.axes;
-        let (focus, per_unit) = match layout.depth {
+        let [x, y, z] = layout.placement.axes;
+        let (focus, per_unit) = match layout.placement.depth {
             Depth::Central { focus } => (focus, 0.0),
             Depth::Parallel { focus, per_unit } => (focus, per_unit),
         };
@@ -93,9 +93,9 @@ impl WindowUniform {
             bounds: Aabb { min: Vec3::splat(-ANYWHERE), max: Vec3::splat(ANYWHERE) },
             texels: [Vec2::splat(-ANYWHERE), Vec2::splat(ANYWHERE)],
         };
-        let Held { bounds, texels: [first_texel, last_texel] } = layout.part.unwrap_or(everywhere);
+        let Held { bounds, texels: [first_texel, last_texel] } = layout.placement.part.unwrap_or(everywhere);
         Self {
-            origin: layout.origin,
+            origin: layout.placement.origin,
             size: window.grid.size,
             x,
             ratio: window.grid.ratio,
@@ -103,10 +103,10 @@ impl WindowUniform {
             focus,
             z,
             per_unit,
-            corner: layout.corner,
-            texels_per_unit: layout.texels_per_unit,
-            reach: layout.reach,
-            max_tan: layout.max_tan.min(ANY_TAN),
+            corner: layout.placement.corner,
+            texels_per_unit: layout.placement.texels_per_unit,
+            reach: layout.placement.reach,
+            max_tan: layout.placement.max_tan.min(ANY_TAN),
             first_index,
             first_offset,
             views: layout.offsets.len() as u32,

@@ -8,7 +8,7 @@ use scene_core::{Light, Scene};
 
 use super::cone::Cone;
 use super::view::Part;
-use super::{Depth, Held, Layout};
+use super::{Depth, Held, Layout, Placement};
 
 /// Tangent of the half angle beyond which a window sees nothing: rays within 3.6° of a flat light's own plane. Wider
 /// windows would have no texel left for what matters.
@@ -88,7 +88,7 @@ impl Fit<'_> {
         let rim = Vec2::splat(part.rim as f32);
         let last = Vec2::splat(self.map_size as f32) - rim;
         let between = (high - low) * Part::BETWEEN;
-        layout.part = Some(Held {
+        layout.placement.part = Some(Held {
             bounds: part.bounds,
             texels: [(low - between).max(rim), (high + between).min(last)],
         });
@@ -265,21 +265,24 @@ impl<'a> Builder<'a> {
         } else {
             Depth::Central { focus: focus as f32 }
         };
-        let layout = Layout {
+        let placement = Placement {
             origin: frame.origin.as_vec3(),
             axes: [frame.axes.x_axis, frame.axes.y_axis, frame.axes.z_axis].map(|axis| axis.as_vec3()),
             depth,
             corner: corner.as_vec2(),
             texels_per_unit: texels_per_unit.as_vec2(),
-            map_size: self.fit.map_size,
             max_tan: frame.max_tan as f32,
-            caster_range: [near, far],
-            offsets: offsets.iter().map(|a| a.as_vec2()).collect(),
             reach: reach.max.max(-reach.min).as_vec2(),
             part: None,
         };
-        let is_finite = layout.corner.is_finite()
-            && layout.texels_per_unit.is_finite()
+        let layout = Layout {
+            placement,
+            map_size: self.fit.map_size,
+            caster_range: [near, far],
+            offsets: offsets.iter().map(|a| a.as_vec2()).collect(),
+        };
+        let is_finite = placement.corner.is_finite()
+            && placement.texels_per_unit.is_finite()
             && layout.t_range().iter().all(|t| t.is_finite());
         is_finite.then_some(layout)
     }

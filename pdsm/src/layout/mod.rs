@@ -37,27 +37,14 @@ pub(crate) enum Depth {
 /// One window: from world space to texels and t, for the light's middle and for each sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
-    /// Origin of the axes, world space: the light's middle, or the scene's for parallel light.
-    pub(crate) origin: Vec3,
-    /// Unit axes: x and y of the window, and the way that light travels.
-    pub(crate) axes: [Vec3; 3],
-    pub(crate) depth: Depth,
-    /// Lower corner of the window on its plane, in the axes' units.
-    pub(crate) corner: Vec2,
-    /// Texels per unit on the window's plane.
-    pub(crate) texels_per_unit: Vec2,
+    /// Where it has its points.
+    pub(crate) placement: Placement,
     /// Texels a side.
     pub(crate) map_size: u32,
-    /// Only points whose tangents are within this of the axis belong here; infinite but for a cube's faces.
-    pub(crate) max_tan: f32,
     /// z of the nearest and of the farthest caster that the maps draw.
     pub(crate) caster_range: [f64; 2],
     /// Samples of the light: offsets a in the window's plane.
     pub(crate) offsets: Vec<Vec2>,
-    /// The largest offset along each axis.
-    pub(crate) reach: Vec2,
-    /// What belongs here, if that is but a part of the scene.
-    pub(crate) part: Option<Held>,
 }
 
 /// What a window holds that is fitted to a part of a scene.
@@ -81,9 +68,9 @@ pub struct WindowPoint {
 impl Layout {
     /// Samples of the light, each as the step D in texels per unit of t.
     pub fn steps(&self) -> impl ExactSizeIterator<Item = Vec2> + '_ {
-        let scale = match self.depth {
-            Depth::Central { .. } => self.texels_per_unit,
-            Depth::Parallel { per_unit, .. } => -self.texels_per_unit / per_unit,
+        let scale = match self.placement.depth {
+            Depth::Central { .. } => self.placement.texels_per_unit,
+            Depth::Parallel { per_unit, .. } => -self.placement.texels_per_unit / per_unit,
         };
         self.offsets.iter().map(move |&offset| offset * scale)
     }
@@ -91,45 +78,30 @@ impl Layout {
     /// t from before the nearest caster to beyond the farthest point that rays are asked for.
     pub fn t_range(&self) -> [f32; 2] {
         let near = self.caster_range[0];
-        match self.depth {
+        match self.placement.depth {
             Depth::Central { focus } => [(1.0 - f64::from(focus) / near) as f32 - 1.0, 1.0],
             // Casters and receivers lie within [−1, 1].
             Depth::Parallel { .. } => [-1.01, 1.01],
         }
     }
 
-    /// What places points on it.
-    #[inline(always)]
-    pub(crate) fn placement(&self) -> Placement {
-        Placement {
-            origin: self.origin,
-            axes: self.axes,
-            depth: self.depth,
-            corner: self.corner,
-            texels_per_unit: self.texels_per_unit,
-            max_tan: self.max_tan,
-            reach: self.reach,
-            part: self.part,
-        }
-    }
-
     /// Where `point` lies; `None` if this window is not the one that looks at it.
     #[inline]
     pub fn locate(&self, point: Vec3) -> Option<WindowPoint> {
-        let (at, belongs) = self.placement().place(point);
+        let (at, belongs) = self.placement.place(point);
         belongs.then_some(at)
     }
 
     /// Whether it is fitted to a part of a scene.
     pub fn is_of_part(&self) -> bool {
-        self.part.is_some()
+        self.placement.part.is_some()
     }
 
     /// How large a texel is where the ray through it passes `point`, as an area across the window's axis.
     pub fn texel_area(&self, point: Vec3) -> f32 {
-        let on_window = (self.texels_per_unit.x * self.texels_per_unit.y).recip();
-        match self.depth {
-            Depth::Central { focus } => on_window * (self.placement().local(point).z / focus).powi(2),
+        let on_window = (self.placement.texels_per_unit.x * self.placement.texels_per_unit.y).recip();
+        match self.placement.depth {
+            Depth::Central { focus } => on_window * (self.placement.local(point).z / focus).powi(2),
             Depth::Parallel { .. } => on_window,
         }
     }
@@ -137,7 +109,7 @@ impl Layout {
     /// Where `point` lies, also if another window looks at it; `None` on and behind the light's plane.
     #[inline]
     pub fn project(&self, point: Vec3) -> Option<WindowPoint> {
-        let placement = self.placement();
+        let placement = self.placement;
         let (at, before) = placement.place_local(placement.local(point));
         before.then_some(at)
     }
@@ -146,14 +118,14 @@ impl Layout {
     /// that the plane is moved along its normal. Infinite where the plane holds the light's middle.
     #[inline(always)]
     pub fn plane_slope(&self, point: Vec3, normal: Vec3, t: f32) -> (Vec2, f32) {
-        self.placement().plane_slope(point, normal, t)
+        self.placement.plane_slope(point, normal, t)
     }
 
     /// The share of the samples that lie above the plane through `point` with unit normal `normal`.
     #[inline]
     pub fn share_above(&self, point: Vec3, normal: Vec3) -> f32 {
         // Mostly the plane does not cut the light.
-        let placement = self.placement();
+        let placement = self.placement;
         match placement.sides(point, normal) {
             [true, _] => return 1.0,
             [_, true] => return 0.0,
@@ -166,15 +138,15 @@ impl Layout {
 
     /// The projection of the map of the sample with step `step`: a texel's x and y in clip space, and reversed depth.
     pub fn map_projection(&self, step: Vec2) -> Mat4 {
-        let [x, y, z] = self.axes.map(Vec3::as_dvec3);
-        let origin = self.origin.as_dvec3();
-        let (scale, corner) = (self.texels_per_unit.as_dvec2(), self.corner.as_dvec2());
+        let [x, y, z] = self.placement.axes.map(Vec3::as_dvec3);
+        let origin = self.placement.origin.as_dvec3();
+        let (scale, corner) = (self.placement.texels_per_unit.as_dvec2(), self.placement.corner.as_dvec2());
         let step = step.as_dvec2();
         let m = f64::from(self.map_size);
         // Rows as functions of world space: a direction and a constant.
         let row =
             |direction: DVec3, constant: f64| (direction.extend(constant - direction.dot(origin))).as_vec4();
-        let rows: [Vec4; 4] = match self.depth {
+        let rows: [Vec4; 4] = match self.placement.depth {
             Depth::Central { focus } => {
                 let f = f64::from(focus);
                 // Texel·z = (F·x − corner·z)·scale + D·(z − F).
@@ -214,7 +186,7 @@ impl Layout {
     /// t of a depth that [`map_projection`](Self::map_projection) yields; infinite for 0, where nothing is.
     pub fn t_of_depth(&self) -> impl Fn(f32) -> f32 + use<> {
         let [near, far] = self.caster_range;
-        let (at_far, per_depth) = match self.depth {
+        let (at_far, per_depth) = match self.placement.depth {
             Depth::Central { focus } => (1.0, (f64::from(focus) / near) as f32),
             Depth::Parallel { focus, per_unit } => {
                 let r = f64::from(per_unit);

@@ -1,21 +1,28 @@
-//! Where a window has its points: what of a [`Layout`](super::Layout) that takes, by value, so that a loop over many
+//! Where a window has its points: the numbers of a [`Layout`](super::Layout) that this takes, by value, so that a loop over many
 //! points branches on no kind of window.
 
 use glam::{Vec2, Vec3};
 
 use super::{Depth, Held, WindowPoint};
 
-/// The fields of [`Layout`](super::Layout) of the same names.
-#[derive(Clone, Copy, Debug)]
+/// See the module.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Placement {
-    pub(super) origin: Vec3,
-    pub(super) axes: [Vec3; 3],
-    pub(super) depth: Depth,
-    pub(super) corner: Vec2,
-    pub(super) texels_per_unit: Vec2,
-    pub(super) max_tan: f32,
-    pub(super) reach: Vec2,
-    pub(super) part: Option<Held>,
+    /// Origin of the axes, world space: the light's middle, or the scene's for parallel light.
+    pub(crate) origin: Vec3,
+    /// Unit axes: x and y of the window, and the way that light travels.
+    pub(crate) axes: [Vec3; 3],
+    pub(crate) depth: Depth,
+    /// Lower corner of the window on its plane, in the axes' units.
+    pub(crate) corner: Vec2,
+    /// Texels per unit on the window's plane.
+    pub(crate) texels_per_unit: Vec2,
+    /// Only points whose tangents are within this of the axis belong here; infinite but for a cube's faces.
+    pub(crate) max_tan: f32,
+    /// The largest offset of a sample of the light along each axis.
+    pub(crate) reach: Vec2,
+    /// What belongs here, if that is but a part of the scene.
+    pub(crate) part: Option<Held>,
 }
 
 impl Placement {

@@ -77,7 +77,7 @@ impl Places {
         let mut own = Self { surfaces: [position.0, normal.0], ..Self::new() };
         let grid = window.grid;
         let node_error = window.functions.nodes().depth_error();
-        window.layout.placement().of_known_kind(
+        window.layout.placement.of_known_kind(
             #[inline(always)]
             |placement: Placement| {
                 for k in 0..BATCH {
@@ -104,7 +104,7 @@ impl Places {
     pub(super) fn of_points(window: &Window, points: &Points, asked: &Lanes<bool>) -> Self {
         let mut own = Self::new();
         let grid = window.grid;
-        window.layout.placement().of_known_kind(
+        window.layout.placement.of_known_kind(
             #[inline(always)]
             |placement: Placement| {
                 for (k, &asked) in asked.iter().enumerate() {

@@ -67,9 +67,9 @@ impl MapCasters {
         }
         let farthest = layout.steps().fold(Vec2::ZERO, |far, step| far.max(step.abs())).as_dvec2() * STEPS;
         let project = |&position: &Vec3| {
-            let p = position.as_dvec3() - layout.origin.as_dvec3();
-            let [x, y, z] = layout.axes.map(|axis| axis.as_dvec3().dot(p));
-            let (on_window, t) = match layout.depth {
+            let p = position.as_dvec3() - layout.placement.origin.as_dvec3();
+            let [x, y, z] = layout.placement.axes.map(|axis| axis.as_dvec3().dot(p));
+            let (on_window, t) = match layout.placement.depth {
                 Depth::Central { focus } => {
                     let scale = f64::from(focus) / z;
                     (DVec3::new(x, y, z) * scale, 1.0 - scale)
@@ -78,8 +78,9 @@ impl MapCasters {
                     (DVec3::new(x, y, z), (z - f64::from(focus)) * f64::from(per_unit))
                 }
             };
-            let steps =
-                (on_window.truncate() - layout.corner.as_dvec2()) * layout.texels_per_unit.as_dvec2() * STEPS;
+            let steps = (on_window.truncate() - layout.placement.corner.as_dvec2())
+                * layout.placement.texels_per_unit.as_dvec2()
+                * STEPS;
             let moved = farthest * t.abs();
             let fits = z >= layout.caster_range[0]
                 && (steps.abs() + moved).max_element() < GUARD
