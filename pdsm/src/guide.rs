@@ -127,18 +127,26 @@ impl Guide {
         let mut entry = start.div_ceil(GROUP as u32) as usize;
         let last = ((end - 1) / GROUP as u32 + 1) as usize;
         while let Some(entries) = self.every.get(entry..).and_then(|rest| rest.first_chunk::<AT_ONCE>()) {
-            let own = last.saturating_sub(entry) as u32;
-            let mut count = 0;
-            for (number, &of_node) in (0u32..).zip(entries) {
-                count += u32::from((of_node <= t) & (number < own));
+            let mut passed = 0;
+            for (number, &of_node) in entries.iter().enumerate() {
+                passed |= u32::from(of_node <= t) << number;
             }
-            entry += count as usize;
-            if (count as usize) < AT_ONCE {
+            let own = passed & first_bits(last.saturating_sub(entry));
+            let count = own.count_ones() as usize;
+            entry += count;
+            if count < AT_ONCE {
                 break;
             }
         }
         entry.saturating_sub(1)
     }
+}
+
+/// As many bits from the lowest on. Comparisons are kept as bits and those of other functions masked away all at once: asked one
+/// by one whether they belong here, they do not become vector instructions.
+#[inline(always)]
+fn first_bits(count: usize) -> u32 {
+    !u32::MAX.checked_shl(count.min(32) as u32).unwrap_or(0)
 }
 
 /// How many nodes of the function `start` to `end` lie in group `group` or before it and are not behind `t`, if all of those before it are not.
@@ -151,20 +159,19 @@ fn until<N: Copy>(
     node: impl Fn(N) -> Node,
 ) -> usize {
     let first = GROUP * group;
-    let (low, high) =
-        ((start as usize).saturating_sub(first) as u32, (end as usize).saturating_sub(first) as u32);
-    let mut count = 0;
+    let mut passed = 0;
     if let Some(own) = nodes.get(first..).and_then(|rest| rest.first_chunk::<GROUP>()) {
-        for (number, &own) in (0u32..).zip(own) {
-            count += u32::from((node(own).t <= t) & (number >= low) & (number < high));
+        for (number, &own) in own.iter().enumerate() {
+            passed |= u32::from(node(own).t <= t) << number;
         }
     } else {
         // The last group of all may be short.
-        for (number, &own) in (0u32..).zip(nodes.get(first..).unwrap_or_default()) {
-            count += u32::from((node(own).t <= t) & (number >= low) & (number < high));
+        for (number, &own) in nodes.get(first..).unwrap_or_default().iter().enumerate() {
+            passed |= u32::from(node(own).t <= t) << number;
         }
     }
-    first.saturating_sub(start as usize) + count as usize
+    let [before, until] = [start, end].map(|end| first_bits((end as usize).saturating_sub(first)));
+    first.saturating_sub(start as usize) + (passed & until & !before).count_ones() as usize
 }
 
 /// V at `t` of the function whose nodes are `range`, which are not none, if `group` is [`Guide::group`] of it.
