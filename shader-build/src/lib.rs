@@ -25,6 +25,11 @@
 //! The table holds one constant per module with an entry point (`gbuffer_pass.wesl` → `GBUFFER_PASS`), and
 //! `ALL`, name and WGSL of every module, those without entry points too, so that a test reaches each.
 //!
+//! # Variants
+//!
+//! Where one thing is done in two ways, modules hold both, behind `@if(feature)` and `@if(!feature)`. A module with an entry
+//! point that uses what is held so is linked without the feature and with it: `shade.wesl` → `SHADE` and `SHADE_PAGED`.
+//!
 //! # Shared modules
 //!
 //! Modules of `gnomon-scene-core` are imported as `scene_core::camera::…`, by itself and by technique crates
@@ -47,7 +52,7 @@ use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 pub use error::{LinkError, Place};
-pub use link::{Declaration, LinkedShader, link_file, modules};
+pub use link::{Declaration, LinkedShader, link_file, link_variants, modules};
 
 /// The value of `links` in scene-core's manifest.
 const SCENE_CORE_LINKS: &str = "gnomon_scene_core";
@@ -103,9 +108,10 @@ fn write_table(
         .map_err(|source| LinkError::File { path: linked_folder.clone(), source })?;
     let mut shaders = Vec::new();
     for file in modules(folder)? {
-        let shader = link_file(&file, own, shared)?;
-        write(&linked_folder.join(format!("{}.wgsl", shader.name)), &shader.wgsl)?;
-        shaders.push(shader);
+        for shader in link_variants(&file, own, shared)? {
+            write(&linked_folder.join(format!("{}.wgsl", shader.name)), &shader.wgsl)?;
+            shaders.push(shader);
+        }
     }
     write(&out.join(format!("{name}.rs")), &table(name, &shaders))
 }

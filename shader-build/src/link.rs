@@ -1,12 +1,13 @@
 //! Linking: a WESL module and what it imports become one WGSL text.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use wesl::syntax::{GlobalDeclaration, PathOrigin};
 use wesl::{
-    CompileOptions, Diagnostic, EscapeMangler, FileResolver, ModulePath, Resolver, Router, SourceMap,
-    SyntaxUtil, VirtualResolver,
+    CompileOptions, Diagnostic, EscapeMangler, Feature, FileResolver, ModulePath, Resolver, Router,
+    SourceMap, SyntaxUtil, VirtualResolver,
 };
 
 use crate::{LinkError, Place};
@@ -69,6 +70,47 @@ pub fn modules(folder: &Path) -> Result<Vec<PathBuf>, LinkError> {
 /// # Errors
 /// A broken module, with file and line.
 pub fn link_file(path: &Path, own: &Path, shared: &Path) -> Result<LinkedShader, LinkError> {
+    link_variant(path, None, own, shared)
+}
+
+/// The module in the file `path` as [`link_file`] links it, with what stands behind `@if(!feature)`; and once more for each
+/// feature that it or what it imports asks for so, with what stands behind `@if(feature)`. The feature's name then follows
+/// the module's. One without entry points comes alone.
+///
+/// # Errors
+/// As [`link_file`].
+pub fn link_variants(path: &Path, own: &Path, shared: &Path) -> Result<Vec<LinkedShader>, LinkError> {
+    let mut shaders = vec![link_file(path, own, shared)?];
+    if shaders[0].has_entry_point {
+        for feature in features(&shaders[0].sources)? {
+            let variant = link_variant(path, Some(&feature), own, shared)?;
+            // One that imports only what the feature does not touch is what it was.
+            if variant.wgsl != shaders[0].wgsl {
+                shaders.push(variant);
+            }
+        }
+    }
+    Ok(shaders)
+}
+
+/// The features that these files ask for.
+fn features(files: &[PathBuf]) -> Result<BTreeSet<String>, LinkError> {
+    let mut features = BTreeSet::new();
+    for file in files {
+        let text =
+            fs::read_to_string(file).map_err(|source| LinkError::File { path: file.clone(), source })?;
+        let asked = text.split("@if(").skip(1).filter_map(|rest| rest.split(')').next());
+        features.extend(asked.map(|feature| feature.trim_start_matches('!').trim().to_owned()));
+    }
+    Ok(features)
+}
+
+fn link_variant(
+    path: &Path,
+    feature: Option<&str>,
+    own: &Path,
+    shared: &Path,
+) -> Result<LinkedShader, LinkError> {
     let name = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
     if name.is_empty() || !name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_') {
         return Err(LinkError::Name { path: path.to_owned() });
@@ -81,8 +123,8 @@ pub fn link_file(path: &Path, own: &Path, shared: &Path) -> Result<LinkedShader,
     let mut router = router(shared);
     router.mount_resolver(root.clone(), this);
     router.mount_fallback_resolver(FileResolver::new(own));
-    let mut shader = link(&root, path, &router)?;
-    shader.name = name.to_owned();
+    let mut shader = link(&root, path, feature, &router)?;
+    shader.name = feature.map_or_else(|| name.to_owned(), |feature| format!("{name}_{feature}"));
     shader.path = path.to_owned();
     Ok(shader)
 }
@@ -94,12 +136,18 @@ fn router(shared: &Path) -> Router {
     router
 }
 
-fn link(root: &ModulePath, file: &Path, router: &Router) -> Result<LinkedShader, LinkError> {
+fn link(
+    root: &ModulePath,
+    file: &Path,
+    feature: Option<&str>,
+    router: &Router,
+) -> Result<LinkedShader, LinkError> {
     let fail = |error: wesl::Error| module_error(&error.into(), file, router);
     let module = router.resolve_module(root).map_err(|error| fail(error.into()))?;
     let has_entry_point = module.entry_points().next().is_some();
-    let options =
+    let mut options =
         CompileOptions { strip: has_entry_point, lazy: has_entry_point, ..CompileOptions::default() };
+    options.features.flags.extend(feature.map(|feature| (feature.to_owned(), Feature::Enable)));
     let linked = wesl::compile_sourcemap(root, router, &EscapeMangler, &options).map_err(fail)?;
     let files = |path: &ModulePath| router.fs_path(path).unwrap_or_else(|| file.to_owned());
     let declarations = linked.syntax.global_declarations.iter().filter_map(|declaration| {
@@ -190,6 +238,22 @@ mod tests {
         assert_eq!(twice.file, shared.path().join("maths.wesl"));
         assert!(shader.wgsl.contains(&twice.linked_name));
         assert_eq!(shader.sources.len(), 2);
+    }
+
+    #[test]
+    fn a_variant_has_what_its_feature_asks_for() {
+        let choice = "@if(paged) fn twice(x: f32) -> f32 { return x + x; }
+@if(!paged) fn twice(x: f32) -> f32 { return 2.0 * x; }
+";
+        let (shared, own) = (folder(&[("maths.wesl", choice)]), folder(&[("entry.wesl", ENTRY)]));
+        let shaders = link_variants(&own.path().join("entry.wesl"), own.path(), shared.path()).unwrap();
+        let [plain, paged] = &shaders[..] else { panic!("{shaders:?}") };
+        assert!(plain.name == "entry" && paged.name == "entry_paged");
+        assert!(plain.wgsl.contains("2.0") && !plain.wgsl.contains("x + x"), "{}", plain.wgsl);
+        assert!(paged.wgsl.contains("x + x") && !paged.wgsl.contains("2.0"), "{}", paged.wgsl);
+        // What has no entry point is no shader yet.
+        let path = shared.path().join("maths.wesl");
+        assert_eq!(link_variants(&path, own.path(), shared.path()).unwrap().len(), 1);
     }
 
     #[test]

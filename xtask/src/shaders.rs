@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use gnomon_shader_build::{LinkedShader, link_file};
+use gnomon_shader_build::{LinkedShader, link_variants};
 use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator};
 
 use crate::shell::{CheckError, root};
@@ -64,8 +64,8 @@ fn check_tree(root: &Path) -> Result<Checked, CheckError> {
             ));
             continue;
         };
-        match link_file(file, own, &shared) {
-            Ok(shader) => check_shader(&shader, &mut checked),
+        match link_variants(file, own, &shared) {
+            Ok(shaders) => shaders.iter().for_each(|shader| check_shader(shader, &mut checked)),
             Err(error) => checked.faults.push(error.to_string()),
         }
     }

@@ -76,9 +76,8 @@ pub struct WindowUniform {
 }
 
 impl WindowUniform {
-    /// What shaders need of `window`, whose pixels and samples follow `first_index` and `first_offset` others,
-    /// and its nodes `first_word` words.
-    pub fn new(window: &Window, first_index: u32, first_offset: u32, first_word: u32) -> Self {
+    /// What shaders need of `window`, whose entries of the index, samples and words of nodes follow as many others.
+    pub fn new(window: &Window, [first_index, first_offset, first_word]: [u32; 3]) -> Self {
         let layout = &window.layout;
         let [x, y, z] = layout.placement.axes;
         let (focus, per_unit) = match layout.placement.depth {
@@ -139,6 +138,10 @@ pub struct PdsmUniform {
     pub tolerance: f32,
     /// Pixels that interpolation reaches: 1 reads four pixels, 0 the nearest one.
     pub radius: u32,
+    /// Texels a side of a page of words are 2 to this, where these are in pages.
+    pub page_bits: u32,
+    /// Zero.
+    pub padding: [u32; 3],
 }
 
 #[cfg(test)]
@@ -180,6 +183,6 @@ mod tests {
                 last_texel
             ]
         );
-        assert_layout!(PdsmUniform, SHADE, "Pdsm", [windows, count, still, tolerance, radius]);
+        assert_layout!(PdsmUniform, SHADE, "Pdsm", [windows, count, still, tolerance, radius, page_bits]);
     }
 }

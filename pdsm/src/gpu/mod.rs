@@ -1,14 +1,16 @@
 //! The GPU path: functions built by the CPU path's own code, uploaded as they lie in memory (figure 6), and looked up in
-//! one full-screen pass, in the order and with the names of [`cpu`](crate::cpu).
+//! one full-screen pass, in the order and with the names of [`cpu`](crate::cpu). Where they are more than the device binds in
+//! one piece they lie in the layers of a texture, up to 2 GiB of them.
 //!
 //! V differs from the CPU's by rounding alone: the G-buffer's positions are found again from their depths, and a depth
 //! that is a step of a function falls before or after it.
 
 pub mod layout;
+mod pages;
 pub mod shaders;
 
 use scene_core::gpu::{
-    GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings,
+    Bound, GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings,
     SceneGroups, VisibilityPass, VisibilityPassParts, binding, binding_limit, storage_buffer,
 };
 use scene_core::technique::{Params as _, TechniqueError};
@@ -17,17 +19,27 @@ use scene_core::{Camera, Origin, Report};
 use crate::baked::{self, Baked};
 use crate::{Pdsm, PdsmParams, PreparedPdsm};
 use layout::{MOST_WINDOWS, PdsmUniform, WindowUniform};
+use pages::Pages;
 
 /// The technique on one device: pipelines, and the functions of the light prepared last.
 #[derive(Debug)]
 pub struct PdsmOnGpu {
     source: Source,
     uniform: HeldBuffer,
-    own: HeldGroup,
     scene: SceneBindings,
     receivers: Receivers,
-    lookup: VisibilityPass,
+    format: wgpu::TextureFormat,
+    from_buffers: Reader,
+    /// Made when functions are first more than the device binds in one piece.
+    from_pages: Option<Reader>,
     prepared: Option<Prepared>,
+}
+
+/// What reads functions from one kind of memory.
+#[derive(Debug)]
+struct Reader {
+    own: HeldGroup,
+    lookup: VisibilityPass,
 }
 
 /// Where functions come from.
@@ -41,6 +53,8 @@ enum Source {
 #[derive(Debug)]
 struct Prepared {
     own: wgpu::BindGroup,
+    /// Read by `from_pages`.
+    is_paged: bool,
     scene: SceneGroups,
     bytes: u64,
     survives_camera: bool,
@@ -58,39 +72,35 @@ impl PdsmOnGpu {
     }
 
     fn from_source(device: &wgpu::Device, source: Source, visibility: wgpu::TextureFormat) -> Self {
-        let stages = wgpu::ShaderStages::FRAGMENT;
-        let types = [binding::UNIFORM, binding::STORAGE, binding::STORAGE, binding::STORAGE];
-        let own = HeldGroup::new(device, "penumbra deep shadow map", stages, &types);
-        let scene = SceneBindings::new(device, stages);
+        let scene = SceneBindings::new(device, wgpu::ShaderStages::FRAGMENT);
         let receivers = Receivers::new(device);
-        let lookup = VisibilityPass::new(
-            device,
-            &VisibilityPassParts {
-                label: "pdsm",
-                wgsl: shaders::SHADE,
-                fragment: "shade_pdsm",
-                own: own.layout(),
-                scene: &scene,
-                receivers: &receivers,
-                format: visibility,
-            },
-        );
-        Self { source, uniform: HeldBuffer::uniform("pdsm"), own, scene, receivers, lookup, prepared: None }
+        let from_buffers = Reader::of_buffers(device, &scene, &receivers, visibility);
+        let uniform = HeldBuffer::uniform("pdsm");
+        Self {
+            source,
+            uniform,
+            scene,
+            receivers,
+            format: visibility,
+            from_buffers,
+            from_pages: None,
+            prepared: None,
+        }
     }
 
     /// Builds the PDSM of the query's light on the CPU, or takes the baked one, and copies it to the device. It holds for
-    /// any camera, but for windows of what the query's camera sees. Of those the farthest are left out where the device does
-    /// not bind the functions of all in one piece: their surfaces are answered by the scene's own window.
+    /// any camera, but for windows of what the query's camera sees. Of those the farthest are left out where the functions of
+    /// all are more than the device holds: their surfaces are answered by the scene's own window.
     ///
     /// # Errors
-    /// A light or a scene that functions were not baked for; a scene without [`GpuScene::geometry`](scene_core::gpu::GpuScene::geometry); more functions than the device binds
-    /// in one piece.
+    /// A light or a scene that functions were not baked for; a scene without [`GpuScene::geometry`](scene_core::gpu::GpuScene::geometry); more functions than
+    /// the device holds.
     pub fn prepare(
         &mut self,
         recorder: &mut Recorder<'_>,
         query: &GpuShadowQuery<'_>,
     ) -> Result<Report, TechniqueError> {
-        self.prepared = None;
+        self.give_back();
         let geometry = query.scene.geometry.ok_or_else(|| TechniqueError::Unsupported {
             technique: PdsmParams::TECHNIQUE,
             input: "a scene on the GPU alone".to_owned(),
@@ -103,50 +113,82 @@ impl PdsmOnGpu {
             }
             Source::Baked(baked) => baked.prepare(geometry, query.light).map_err(baked::refused)?,
         };
-        let most = binding_limit(recorder.device);
+        let most = binding_limit(recorder.device).max(Pages::of(recorder.device).most_bytes());
         report.skip("windows beyond the device's memory", pdsm.leave_out_parts(most));
-        report.time("prepare.upload", |_| self.upload(recorder.device, query, &pdsm))?;
+        report.time("prepare.upload", |_| self.upload(recorder, query, &pdsm))?;
         Ok(report)
     }
 
     /// `prepare.upload`: functions that are there already, built or read from a file, are copied to the device.
     ///
     /// # Errors
-    /// More functions than the device binds in one piece.
+    /// More functions than the device holds.
     pub fn upload(
         &mut self,
-        device: &wgpu::Device,
+        recorder: &Recorder<'_>,
         query: &GpuShadowQuery<'_>,
         pdsm: &PreparedPdsm<'_>,
     ) -> Result<(), TechniqueError> {
-        self.prepared = None;
+        let Recorder { device, queue, .. } = *recorder;
+        self.give_back();
+        let windows = || pdsm.windows.iter().chain(pdsm.moving.iter());
+        GpuError::within("windows", windows().count() as u32, MOST_WINDOWS as u32)?;
+        let index: Vec<&[u32]> = windows().map(|window| window.functions.index()).collect();
+        let nodes: Vec<&[u32]> = windows().map(|window| window.functions.nodes().words()).collect();
+        let offsets: Vec<_> = windows().flat_map(|window| window.layout.offsets.iter().copied()).collect();
+        let offsets = storage_buffer(device, "samples of the light", bytemuck::cast_slice(&offsets))?;
+        let is_paged = bytes(&index).max(bytes(&nodes)) > binding_limit(device);
+        let (functions, held, first_word): (Vec<Bound>, _, _) = if is_paged {
+            let all = [&*index, &*nodes].concat();
+            let (pages, held) = Pages::of(device).texture(device, queue, "functions", &all)?;
+            (vec![(&pages).into()], held, (bytes(&index) / 4) as u32)
+        } else {
+            let buffer = |what, pieces: &[&[u32]]| {
+                storage_buffer(device, what, bytemuck::cast_slice(&pieces.concat()))
+            };
+            let (nodes, index) =
+                (buffer("nodes of functions", &nodes)?, buffer("index of functions", &index)?);
+            let held = nodes.size() + index.size();
+            (vec![nodes.into(), index.into()], held, 0)
+        };
         let mut uniform = PdsmUniform {
-            count: (pdsm.windows.len() + pdsm.moving.len()) as u32,
+            count: windows().count() as u32,
             still: pdsm.windows.len() as u32,
             tolerance: pdsm.tolerance,
             radius: pdsm.radius(),
+            page_bits: Pages::of(device).bits,
             ..bytemuck::Zeroable::zeroed()
         };
-        GpuError::within("windows", uniform.count, MOST_WINDOWS as u32)?;
-        let (mut index, mut nodes, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
-        for (into, window) in uniform.windows.iter_mut().zip(pdsm.windows.iter().chain(pdsm.moving.iter())) {
-            // Far below u32's end: what the device binds in one piece, checked below, is less.
-            *into = WindowUniform::new(window, index.len() as u32, offsets.len() as u32, nodes.len() as u32);
-            index.extend_from_slice(window.functions.index());
-            nodes.extend_from_slice(window.functions.nodes().words());
-            offsets.extend_from_slice(&window.layout.offsets);
+        // Far below u32's end, as what the device holds is.
+        let mut firsts = [0, 0, first_word];
+        for (into, window) in uniform.windows.iter_mut().zip(windows()) {
+            *into = WindowUniform::new(window, firsts);
+            let functions = &window.functions;
+            let own = [functions.index().len(), window.layout.offsets.len(), functions.nodes().words().len()];
+            firsts.iter_mut().zip(own).for_each(|(first, own)| *first += own as u32);
         }
-        let index = storage_buffer(device, "index of functions", bytemuck::cast_slice(&index))?;
-        let nodes = storage_buffer(device, "nodes of functions", bytemuck::cast_slice(&nodes))?;
-        let offsets = storage_buffer(device, "samples of the light", bytemuck::cast_slice(&offsets))?;
-        let bytes = index.size() + nodes.size() + offsets.size();
         let uniform = self.uniform.get(device, bytemuck::bytes_of(&uniform));
-        let bound = [uniform.into(), index.into(), nodes.into(), offsets.into()];
-        let own = self.own.get(device, &bound);
+        let bytes = held + offsets.size();
+        let bound = [vec![uniform.into(), offsets.into()], functions].concat();
+        let reader = if is_paged {
+            let (scene, receivers, format) = (&self.scene, &self.receivers, self.format);
+            self.from_pages.get_or_insert_with(|| Reader::of_pages(device, scene, receivers, format))
+        } else {
+            &mut self.from_buffers
+        };
+        let own = reader.own.get(device, &bound);
         let (scene, survives_camera) = (self.scene.groups(device, &query.scene), pdsm.survives_camera());
-        self.prepared = Some(Prepared { own, scene, bytes, survives_camera });
+        self.prepared = Some(Prepared { own, is_paged, scene, bytes, survives_camera });
         self.receivers.prepare(device, query);
         Ok(())
+    }
+
+    /// Lets go of what was prepared last: memory need not hold both.
+    fn give_back(&mut self) {
+        self.prepared = None;
+        for reader in self.from_pages.iter_mut().chain([&mut self.from_buffers]) {
+            reader.own = reader.own.another();
+        }
     }
 
     /// Whether what was prepared last would be the same for any other camera.
@@ -168,7 +210,60 @@ impl PdsmOnGpu {
         let not_prepared = || TechniqueError::NotPrepared { technique: PdsmParams::TECHNIQUE };
         let prepared = self.prepared.as_ref().ok_or_else(not_prepared)?;
         let receivers = self.receivers.group(recorder.device, camera, gbuffer).ok_or_else(not_prepared)?;
-        self.lookup.record(recorder, "shade.lookup", &prepared.own, &prepared.scene, &receivers, visibility);
+        let reader = if prepared.is_paged { self.from_pages.as_ref() } else { Some(&self.from_buffers) };
+        let lookup = &reader.ok_or_else(not_prepared)?.lookup;
+        lookup.record(recorder, "shade.lookup", &prepared.own, &prepared.scene, &receivers, visibility);
         Ok(Report { bytes: prepared.bytes, ..Default::default() })
+    }
+}
+
+/// Bytes of all pieces.
+fn bytes(pieces: &[&[u32]]) -> u64 {
+    pieces.iter().map(|piece| size_of_val(*piece) as u64).sum()
+}
+
+impl Reader {
+    /// Reads nodes and index from a buffer each.
+    fn of_buffers(
+        device: &wgpu::Device,
+        scene: &SceneBindings,
+        receivers: &Receivers,
+        format: wgpu::TextureFormat,
+    ) -> Self {
+        let functions = [binding::STORAGE, binding::STORAGE];
+        Self::new(device, scene, receivers, format, &functions, shaders::SHADE)
+    }
+
+    /// Reads both from [`Pages`].
+    fn of_pages(
+        device: &wgpu::Device,
+        scene: &SceneBindings,
+        receivers: &Receivers,
+        format: wgpu::TextureFormat,
+    ) -> Self {
+        Self::new(device, scene, receivers, format, &[binding::ID_LAYERS], shaders::SHADE_PAGED)
+    }
+
+    fn new(
+        device: &wgpu::Device,
+        scene: &SceneBindings,
+        receivers: &Receivers,
+        format: wgpu::TextureFormat,
+        functions: &[wgpu::BindingType],
+        wgsl: &str,
+    ) -> Self {
+        let types = [&[binding::UNIFORM, binding::STORAGE][..], functions].concat();
+        let own = HeldGroup::new(device, "penumbra deep shadow map", wgpu::ShaderStages::FRAGMENT, &types);
+        let parts = VisibilityPassParts {
+            label: "pdsm",
+            wgsl,
+            fragment: "shade_pdsm",
+            own: own.layout(),
+            scene,
+            receivers,
+            format,
+        };
+        let lookup = VisibilityPass::new(device, &parts);
+        Self { own, lookup }
     }
 }

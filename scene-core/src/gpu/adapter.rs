@@ -36,11 +36,16 @@ impl Gpu {
     /// # Errors
     /// [`GpuError::is_missing`] says that there is none.
     pub fn open() -> Result<Self, GpuError> {
+        Self::open_asked_for(|_| ())
+    }
+
+    /// [`open`](Self::open), with limits that `lower` takes from the adapter's.
+    pub(super) fn open_asked_for(lower: impl FnOnce(&mut wgpu::Limits)) -> Result<Self, GpuError> {
         let variable = |name| env::var(name).ok().filter(|value| !value.is_empty());
         if variable("GNOMON_GPU").is_some_and(|value| value.eq_ignore_ascii_case("off")) {
             return Err(GpuError::TurnedOff);
         }
-        Self::open_adapter(variable("GNOMON_ADAPTER").as_deref())
+        Self::open_limited(variable("GNOMON_ADAPTER").as_deref(), lower)
     }
 
     /// Opens the adapter of this number or with this part of its name, whatever the environment says.
@@ -48,16 +53,26 @@ impl Gpu {
     /// # Errors
     /// As [`Gpu::open`].
     pub fn open_adapter(asked: Option<&str>) -> Result<Self, GpuError> {
+        Self::open_limited(asked, |_| ())
+    }
+
+    /// [`open_adapter`](Self::open_adapter), with limits that `lower` takes from the adapter's.
+    pub(super) fn open_limited(
+        asked: Option<&str>,
+        lower: impl FnOnce(&mut wgpu::Limits),
+    ) -> Result<Self, GpuError> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
         let infos: Vec<_> = adapters.iter().map(wgpu::Adapter::get_info).collect();
         let chosen = choose(&infos, asked)?;
         let info = infos[chosen].clone();
         let adapter = &adapters[chosen];
+        let mut limits = adapter.limits();
+        lower(&mut limits);
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("gnomon"),
             required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
-            required_limits: adapter.limits(),
+            required_limits: limits,
             ..Default::default()
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))

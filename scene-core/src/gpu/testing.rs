@@ -19,7 +19,15 @@ pub fn pipelines_and_layouts_made() -> [u64; 2] {
 /// # Panics
 /// If there is no device: a test that would silently check nothing fails instead.
 pub fn gpu() -> Option<Gpu> {
-    match Gpu::open() {
+    gpu_within(|_| ())
+}
+
+/// The same with limits lower than the adapter's, as a smaller one would have: `lower` takes from them.
+///
+/// # Panics
+/// As [`gpu`].
+pub fn gpu_within(lower: impl FnOnce(&mut wgpu::Limits)) -> Option<Gpu> {
+    match Gpu::open_asked_for(lower) {
         Ok(gpu) => Some(gpu),
         Err(GpuError::TurnedOff) => {
             eprintln!("skipped: GNOMON_GPU=off");

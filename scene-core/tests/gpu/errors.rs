@@ -76,20 +76,15 @@ fn an_adapter_that_is_not_there_is_named() {
 #[test]
 fn an_array_too_large_to_bind_is_refused_before_it_is_made() {
     let Some(gpu) = testing::gpu() else { return };
-    // A device that binds less than the scene needs: WebGPU's smallest, and a scene just above it.
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-    let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
-    let adapter = adapters.iter().find(|a| a.get_info().name == gpu.adapter.name).unwrap();
-    let limits = wgpu::Limits { max_storage_buffer_binding_size: 1 << 12, ..wgpu::Limits::default() };
-    let (device, _) = pollster::block_on(
-        adapter.request_device(&wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() }),
-    )
-    .unwrap();
+    // A device that binds less than the scene needs.
+    let Some(small) = testing::gpu_within(|limits| limits.max_storage_buffer_binding_size = 1 << 12) else {
+        return;
+    };
     let mut scene = Scene::new();
     let corners = vec![glam::Vec3::ZERO; 3];
     let mesh = gnomon_scene_core::TriangleMesh::new("many", corners, vec![[0, 1, 2]; 400]);
     scene.add(&mesh, glam::Affine3A::IDENTITY, Default::default()).unwrap();
-    let error = SceneBuffers::new(&device, &scene).unwrap_err();
+    let error = SceneBuffers::new(&small.device, &scene).unwrap_err();
     assert_eq!(error, GpuError::TooLarge { what: "triangles", bytes: 4800, limit: 4096 });
     let text = error.to_string();
     for word in ["triangles need 4800 bytes", "4096", "fewer triangles", "GNOMON_ADAPTER", "--backend cpu"] {

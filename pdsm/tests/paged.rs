@@ -1,0 +1,106 @@
+//! Functions that are more than the device binds in one piece: the same image, bit for bit, as on a device that binds them.
+
+#![cfg(feature = "gpu")]
+
+use gnomon_pdsm::gpu::PdsmOnGpu;
+use gnomon_pdsm::{Pdsm, PdsmParams, Precision};
+use scene_core::gpu::headless::VISIBILITY_FORMAT;
+use scene_core::gpu::{Gpu, HeadlessError, HeadlessRun, testing};
+use scene_core::{GBuffer, Light, SceneSetup, VisibilityImage, raster, scenes};
+
+fn params() -> PdsmParams {
+    PdsmParams { views: 16, map_size: 256, pdsm_size: 256, ..Default::default() }
+}
+
+/// Bytes that the small device binds in one piece.
+const LIMIT: u64 = 1 << 22;
+
+/// A device whose pages hold 1 MiB, `layers` of them, and that binds 4 MiB of a buffer.
+fn small(layers: u32) -> Option<Gpu> {
+    testing::gpu_within(|limits| {
+        limits.max_storage_buffer_binding_size = LIMIT;
+        limits.max_texture_dimension_2d = 512;
+        limits.max_texture_array_layers = layers;
+    })
+}
+
+fn setup(name: &str) -> (SceneSetup, GBuffer) {
+    let mut setup = scenes::build(name, 0.4).unwrap();
+    (setup.camera.width, setup.camera.height) = (96, 72);
+    let gbuffer = raster::render_gbuffer(&setup.scene, &setup.camera);
+    (setup, gbuffer)
+}
+
+fn run(
+    gpu: &Gpu,
+    (setup, gbuffer): &(SceneSetup, GBuffer),
+    light: &Light,
+    pdsm: &mut PdsmOnGpu,
+) -> Result<HeadlessRun, HeadlessError> {
+    let mut view = gpu.view(&setup.scene, &setup.camera)?;
+    view.upload_gbuffer(gbuffer)?;
+    view.run(pdsm, light, gbuffer)
+}
+
+fn bits(image: &VisibilityImage) -> Vec<u32> {
+    image.values.iter().map(|value| value.to_bits()).collect()
+}
+
+/// Lights outside and amid the casters.
+fn lights(setup: &SceneSetup) -> [Light; 2] {
+    let bounds = setup.scene.bounds();
+    [setup.lights[0], Light::Sphere { center: bounds.center(), radius: 0.02 * bounds.diagonal() }]
+}
+
+#[test]
+fn pages_hold_what_buffers_hold() {
+    let (Some(gpu), Some(small)) = (testing::gpu(), small(256)) else { return };
+    for name in ["chess", "quads"] {
+        let seen = setup(name);
+        for params in [params(), PdsmParams { precision: Precision::Half, filter_radius: 2, ..params() }] {
+            // One for all lights: what is paged comes after what is not, and before it.
+            let new = |gpu: &Gpu| PdsmOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT);
+            let (mut whole, mut paged) = (new(&gpu), new(&small));
+            let (position, direction) = (seen.0.scene.bounds().max, glam::Vec3::Y);
+            let away = Light::Spot { position, direction, outer: 0.3, inner: 0.2 };
+            let [outside, inside] = lights(&seen.0);
+            for light in [inside, away, outside, inside] {
+                let (pdsm, _) = Pdsm::new(params).prepare_for(&seen.0.scene, &light, Some(&seen.0.camera));
+                let words = pdsm.windows().iter().map(|window| window.functions.nodes().words().len() as u64);
+                let bytes = 4 * words.sum::<u64>();
+                println!("{name}, {light:?}: {bytes} bytes");
+                assert!(bytes > LIMIT || light != inside, "{name}, {light:?}: {bytes} bytes");
+                let whole = run(&gpu, &seen, &light, &mut whole).unwrap();
+                let paged = run(&small, &seen, &light, &mut paged).unwrap();
+                assert!(bits(&whole.visibility) == bits(&paged.visibility), "{name}, {params:?}, {light:?}");
+            }
+        }
+    }
+}
+
+/// What moves is looked up in windows of its own.
+#[test]
+fn pages_hold_baked_functions() {
+    let (Some(gpu), Some(small)) = (testing::gpu(), small(256)) else { return };
+    let seen = setup("street");
+    for light in lights(&seen.0) {
+        let (baked, _) = Pdsm::new(params()).bake(&seen.0.scene, &light);
+        let [whole, paged] = [&gpu, &small].map(|gpu| {
+            let mut pdsm = PdsmOnGpu::from_baked(&gpu.device, baked.clone(), VISIBILITY_FORMAT);
+            run(gpu, &seen, &light, &mut pdsm).unwrap()
+        });
+        assert!(bits(&whole.visibility) == bits(&paged.visibility), "{light:?}");
+    }
+}
+
+#[test]
+fn what_pages_do_not_hold_is_an_error() {
+    let Some(small) = small(1) else { return };
+    let seen = setup("chess");
+    let mut pdsm = PdsmOnGpu::new(&small.device, params(), VISIBILITY_FORMAT);
+    let [_, light] = lights(&seen.0);
+    let error = run(&small, &seen, &light, &mut pdsm).unwrap_err().to_string();
+    for word in ["functions need", "1048576", "smaller or fewer maps", "GNOMON_ADAPTER", "--backend cpu"] {
+        assert!(error.contains(word), "{error}");
+    }
+}
