@@ -1,4 +1,4 @@
-//! Shadow volumes against one shadow ray a pixel; `auto` against `z-fail`; what culling saves; silhouettes a second.
+//! Shadow volumes against one shadow ray a pixel; `auto` against `z-fail`; silhouettes a second. What skipping saves: `culling.rs`.
 //!
 //! Rays get their tree for nothing and volumes their edges: both live as long as the scene does, and both are timed on
 //! their own.
@@ -11,9 +11,10 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use gnomon_stencil_volumes::silhouette::extract;
 use gnomon_stencil_volumes::{Casters, Count, StencilVolumes, VolumeParams};
+use rayon::prelude::*;
 use scene_core::bvh::Bvh;
-use scene_core::geometry::facing;
-use scene_core::{Camera, Report, SceneSetup, VisibilityImage, raster, scenes};
+use scene_core::geometry::{Incidence, facing};
+use scene_core::{VisibilityImage, raster, scenes};
 
 fn methods(criterion: &mut Criterion) {
     for spec in ["ball", "knot", "log-cabin", "chess", "street", "forest:triangles=200000"] {
@@ -38,54 +39,6 @@ fn methods(criterion: &mut Criterion) {
     }
 }
 
-/// What one frame of each kind takes and leaves out.
-fn frames(spec: &str, setup: &SceneSetup, camera: &Camera) {
-    let gbuffer = raster::render_gbuffer(&setup.scene, camera);
-    let casters = Casters::new(&setup.scene).expect("few triangles");
-    let mut visibility = VisibilityImage::new(camera.width, camera.height);
-    for (skip, rays) in [(true, true), (false, true), (true, false), (false, false)] {
-        let technique = StencilVolumes::new(VolumeParams { skip, rays, ..Default::default() });
-        let mut best = (f64::INFINITY, Report::default());
-        for _ in 0..3 {
-            let start = std::time::Instant::now();
-            let (prepared, mut report) = technique.prepare(&casters, &setup.lights[0], camera);
-            report.merge(&prepared.shade(&gbuffer, &mut visibility));
-            let ms = start.elapsed().as_secs_f64() * 1e3;
-            if ms < best.0 {
-                best = (ms, report);
-            }
-        }
-        let (ms, report) = best;
-        println!(
-            "{spec}, {}², skip {skip}, rays {rays}: {ms:.2} ms; {:.2?}; left out: {:?}",
-            camera.width, report.stages_ms, report.skipped
-        );
-    }
-}
-
-/// A view of a corner of a large scene, with culling and without.
-fn culling(criterion: &mut Criterion) {
-    for spec in ["street", "forest:triangles=200000"] {
-        let setup = scenes::build(spec, 0.0).expect("a built-in scene");
-        let (scene, light) = (&setup.scene, setup.lights[0]);
-        let camera = Camera { fov_y: 0.12, ..setup.camera.with_size(256, 256) };
-        frames(spec, &setup, &setup.camera.with_size(512, 512));
-        frames(spec, &setup, &camera);
-        let gbuffer = raster::render_gbuffer(scene, &camera);
-        let casters = Casters::new(scene).expect("few triangles");
-        let mut visibility = VisibilityImage::new(256, 256);
-        let mut group = criterion.benchmark_group(format!("culling/{spec}"));
-        group.sample_size(10);
-        for skip in [true, false] {
-            let technique = StencilVolumes::new(VolumeParams { skip, ..Default::default() });
-            group.bench_function(format!("skip {skip}"), |b| {
-                b.iter(|| technique.prepare(&casters, &light, &camera).0.shade(&gbuffer, &mut visibility));
-            });
-        }
-        group.finish();
-    }
-}
-
 /// A scene that fits into caches, and one of two million triangles that does not.
 const STREAMED: [&str; 2] = ["chess", "knot:sides=250"];
 
@@ -100,17 +53,32 @@ fn silhouettes_of(criterion: &mut Criterion, spec: &str) {
     let scene = &setup.scene;
     let casters = Casters::new(scene).expect("few triangles");
     let facing = facing(scene.positions(), scene.triangles(), setup.lights[0].center());
-    // What a pass must read: both vertex indices of an edge, its row, and its faces with their facing.
-    let edges = casters.topology.len();
-    let incidences: usize = (0..edges).map(|e| casters.topology.faces(e).len()).sum();
-    let bytes = (edges * (8 + 4) + incidences * (4 + 1)) as u64;
+    let topology = &casters.topology;
+    let run = || extract((topology, &casters.runs), scene.positions(), &facing);
+    // What a pass must read: an edge's faces and their facing, of the silhouette's edges both vertex indices, too.
+    let (edges, open) = (topology.len(), run().len());
+    let faces = topology.faces_of(0..edges);
+    let bytes = (size_of_val(faces) + faces.len() + 8 * open) as u64;
+    println!(
+        "{spec}: {edges} edges, {open} of the silhouette, {:.1} bytes an edge",
+        bytes as f64 / edges as f64
+    );
     let mut group = criterion.benchmark_group(format!("silhouette/{spec}"));
-    for (name, throughput) in
-        [("edges", Throughput::Elements(edges as u64)), ("bytes", Throughput::Bytes(bytes))]
-    {
-        group.throughput(throughput);
-        group.bench_function(name, |b| {
-            b.iter(|| black_box(extract(&casters.topology, scene.positions(), &facing)));
+    for threads in [1, rayon::current_num_threads()] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        for (name, throughput) in
+            [("edges", Throughput::Elements(edges as u64)), ("bytes", Throughput::Bytes(bytes))]
+        {
+            group.throughput(throughput);
+            group.bench_function(format!("{name}, {threads} threads"), |b| {
+                pool.install(|| b.iter(|| black_box(run())));
+            });
+        }
+        // The same faces, with nothing done but to add them up.
+        group.throughput(Throughput::Bytes(size_of_val(faces) as u64));
+        group.bench_function(format!("plain reading, {threads} threads"), |b| {
+            let sum = |faces: &[Incidence]| faces.iter().fold(0_u32, |sum, f| sum.wrapping_add(f.face()));
+            pool.install(|| b.iter(|| faces.par_chunks(1 << 15).map(sum).reduce(|| 0, u32::wrapping_add)));
         });
     }
     group.finish();
@@ -163,5 +131,5 @@ fn silhouettes_of_on_gpu(criterion: &mut Criterion, gpu: &scene_core::gpu::Gpu, 
 #[cfg(not(feature = "gpu"))]
 fn silhouettes_on_gpu(_: &mut Criterion) {}
 
-criterion_group!(benches, methods, culling, silhouettes, silhouettes_on_gpu);
+criterion_group!(benches, methods, silhouettes, silhouettes_on_gpu);
 criterion_main!(benches);

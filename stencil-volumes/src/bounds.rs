@@ -45,6 +45,13 @@ impl BoxGroup {
             self.half[axis][lane] = half[axis];
         }
     }
+
+    /// The boxes that may have a point with g·x + k ≥ 0, or, if `both`, one on the plane itself.
+    #[inline(always)]
+    pub fn touching<S: Simd>(&self, simd: S, plane: [f64; 4], both: bool) -> u32 {
+        let wide = |values: &[[f64; LANES]; 3]| [0, 1, 2].map(|axis| f64x8::from_slice(simd, &values[axis]));
+        touches(simd, plane.map(|x| f64x8::splat(simd, x)), wide(&self.center), wide(&self.half), both)
+    }
 }
 
 impl SideGroup {

@@ -14,6 +14,7 @@ use crate::crossing::HomogeneousLight;
 use crate::error::VolumeError;
 use crate::masked::MaskedCasters;
 use crate::silhouette::EdgeRuns;
+use crate::skips::Skips;
 
 /// Edges and bounds of a scene's casters. Independent of light and camera.
 #[derive(Clone, Debug)]
@@ -53,16 +54,23 @@ impl<'a> Casters<'a> {
         self.topology.bytes() + self.runs.bytes() + self.chunks.bytes() + self.tree.bytes()
     }
 
-    /// All casting triangles, as ranges of [`Scene::triangles`].
-    pub fn all(&self) -> Vec<Range<usize>> {
-        let casts = self.scene.objects().iter().filter(|o| o.flags.casts && !o.triangles.is_empty());
-        casts.map(|o| o.triangles.clone()).collect()
-    }
-
-    /// The casting triangles that may shadow what `camera` sees; books what is left out.
-    pub fn relevant(&self, light: &Light, camera: &Camera, report: &mut Report) -> Vec<Range<usize>> {
-        let hidden = self.in_anothers_shadow(light);
+    /// The casting triangles that may shadow what `camera` sees, as far as `skips` looks for them; books what is left out.
+    pub fn relevant(
+        &self,
+        light: &Light,
+        camera: &Camera,
+        skips: &Skips,
+        report: &mut Report,
+    ) -> Vec<Range<usize>> {
+        let hidden = if skips.shadowed { in_anothers_shadow(self.scene, light) } else { Vec::new() };
         report.skip("casters in another's shadow", hidden.len() as u64);
+        if !skips.outside {
+            let objects = (0..).zip(self.scene.objects());
+            let kept = objects.filter(|(id, o)| {
+                o.flags.casts && !o.triangles.is_empty() && hidden.binary_search(id).is_err()
+            });
+            return kept.map(|(_, o)| o.triangles.clone()).collect();
+        }
         // Only the middle of the light throws shadows.
         let region = CasterRegion::of(self.scene, camera, &light.reduced_to(light.center()));
         let kept =
@@ -70,54 +78,53 @@ impl<'a> Casters<'a> {
         kept.book(report);
         kept.ranges
     }
+}
 
-    /// Ids of casters that lie wholly in the shadow of one triangle: whatever they hide, it hides too.
-    ///
-    /// Asked of the [`COVERS`] triangles that look largest from the light, and of the objects' boxes.
-    fn in_anothers_shadow(&self, light: &Light) -> Vec<u32> {
-        /// Large triangles tried. Each costs an object some 20 ns.
-        const COVERS: usize = 16;
-        /// Objects and triangles of each that are looked at for large ones: some 50 µs in all.
-        const ASKED: usize = 64;
-        let (scene, center) = (self.scene, light.center());
-        let homogeneous = HomogeneousLight::from(center);
-        let casters =
-            || (0_u32..).zip(scene.objects()).filter(|(_, o)| o.flags.casts && !o.bounds.is_empty());
-        // Of many objects the largest are asked, and of large meshes only a few triangles: their triangles are small.
-        let mut large: Vec<_> = casters().filter(|(_, object)| object.alpha.is_none()).collect();
-        if large.len() > ASKED {
-            let size = |object: &Object| object.bounds.diagonal();
-            large.select_nth_unstable_by(ASKED, |a, b| size(b.1).total_cmp(&size(a.1)).then(a.0.cmp(&b.0)));
-            large.truncate(ASKED);
-        }
-        let mut covers: Vec<(f64, [Vec3; 3])> = large
-            .into_iter()
-            .flat_map(|(_, object)| object.triangles.clone().step_by(object.triangles.len().div_ceil(ASKED)))
-            .map(|triangle| {
-                let corners = scene.corners(triangle);
-                (apparent_size(corners, &homogeneous), corners)
-            })
-            .filter(|(size, _)| *size > 0.0)
-            .collect();
-        let count = COVERS.min(covers.len());
-        if count == 0 {
-            return Vec::new();
-        }
-        covers.select_nth_unstable_by(count - 1, |a, b| b.0.total_cmp(&a.0));
-        covers.truncate(count);
-        // Positions and the origins of shadow rays are exact to about 2⁻²⁰ of the largest coordinate.
-        let margin = f64::from(scene.bounds().magnitude()) / 262_144.0;
-        let shadows: Vec<_> = covers.iter().filter_map(|(_, c)| shadow_of(*c, center, margin)).collect();
-        casters()
-            .filter(|(_, object)| {
-                let corners = object.bounds.corners().map(|c| c.as_dvec3());
-                shadows.iter().any(|planes| {
-                    planes.iter().all(|(n, offset)| corners.iter().all(|c| n.dot(*c) <= *offset))
-                })
-            })
-            .map(|(id, _)| id)
-            .collect()
+/// Ids of casters that lie wholly in the shadow of one triangle: whatever they hide, it hides too.
+///
+/// Asked of the [`COVERS`] triangles that look largest from the light, and of the objects' boxes.
+pub(crate) fn in_anothers_shadow(scene: &Scene, light: &Light) -> Vec<u32> {
+    /// Large triangles tried. Each costs an object some 20 ns.
+    const COVERS: usize = 16;
+    /// Objects and triangles of each that are looked at for large ones: some 50 µs in all.
+    const ASKED: usize = 64;
+    let center = light.center();
+    let homogeneous = HomogeneousLight::from(center);
+    let casters = || (0_u32..).zip(scene.objects()).filter(|(_, o)| o.flags.casts && !o.bounds.is_empty());
+    // Of many objects the largest are asked, and of large meshes only a few triangles: their triangles are small.
+    let mut large: Vec<_> = casters().filter(|(_, object)| object.alpha.is_none()).collect();
+    if large.len() > ASKED {
+        let size = |object: &Object| object.bounds.diagonal();
+        large.select_nth_unstable_by(ASKED, |a, b| size(b.1).total_cmp(&size(a.1)).then(a.0.cmp(&b.0)));
+        large.truncate(ASKED);
     }
+    let mut covers: Vec<(f64, [Vec3; 3])> = large
+        .into_iter()
+        .flat_map(|(_, object)| object.triangles.clone().step_by(object.triangles.len().div_ceil(ASKED)))
+        .map(|triangle| {
+            let corners = scene.corners(triangle);
+            (apparent_size(corners, &homogeneous), corners)
+        })
+        .filter(|(size, _)| *size > 0.0)
+        .collect();
+    let count = COVERS.min(covers.len());
+    if count == 0 {
+        return Vec::new();
+    }
+    covers.select_nth_unstable_by(count - 1, |a, b| b.0.total_cmp(&a.0));
+    covers.truncate(count);
+    // Positions and the origins of shadow rays are exact to about 2⁻²⁰ of the largest coordinate.
+    let margin = f64::from(scene.bounds().magnitude()) / 262_144.0;
+    let shadows: Vec<_> = covers.iter().filter_map(|(_, c)| shadow_of(*c, center, margin)).collect();
+    casters()
+        .filter(|(_, object)| {
+            let corners = object.bounds.corners().map(|c| c.as_dvec3());
+            shadows
+                .iter()
+                .any(|planes| planes.iter().all(|(n, offset)| corners.iter().all(|c| n.dot(*c) <= *offset)))
+        })
+        .map(|(id, _)| id)
+        .collect()
 }
 
 /// The solid angle up to a factor, or the area across a parallel light's direction.

@@ -12,7 +12,9 @@ pub mod outline;
 mod params;
 pub mod planar;
 pub mod receivers;
+pub mod runs;
 pub mod silhouette;
+mod skips;
 mod technique;
 pub mod volumes;
 
@@ -30,13 +32,21 @@ pub use error::VolumeError;
 pub use gpu::StencilVolumesOnGpu;
 pub use params::{Count, Variant, VolumeParams};
 use receivers::FlatReceivers;
+pub use skips::Skips;
 pub use technique::Factory;
 use volumes::Volumes;
 
 /// The technique: settings, from which any number of lights can be prepared.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct StencilVolumes {
     params: VolumeParams,
+    skips: Skips,
+}
+
+impl Default for StencilVolumes {
+    fn default() -> Self {
+        Self::new(VolumeParams::default())
+    }
 }
 
 /// What a variant prepares.
@@ -52,7 +62,7 @@ pub struct PreparedVolumes<'a> {
     scene: &'a Scene,
     light: Light,
     camera: Camera,
-    skip: bool,
+    skips: Skips,
     tree: Arc<Bvh>,
     prepared: Prepared,
 }
@@ -60,7 +70,13 @@ pub struct PreparedVolumes<'a> {
 impl StencilVolumes {
     /// A technique with these settings.
     pub fn new(params: VolumeParams) -> Self {
-        Self { params }
+        Self { params, skips: Skips::new(params.skip) }
+    }
+
+    /// The same with other skips than [`VolumeParams::skip`] says, to measure one by one. No image changes.
+    #[must_use]
+    pub fn with_skips(self, skips: Skips) -> Self {
+        Self { skips, ..self }
     }
 
     /// Prepares `light` for what `camera` sees. `casters` is made once a scene and kept from frame to frame.
@@ -71,14 +87,14 @@ impl StencilVolumes {
         camera: &Camera,
     ) -> (PreparedVolumes<'a>, Report) {
         let mut report = Report::default();
-        let VolumeParams { variant, skip, .. } = self.params;
+        let skips = self.skips;
         let scene = casters.scene;
-        let prepared = match variant {
+        let prepared = match self.params.variant {
             Variant::Planar => {
                 Prepared::Planar(report.time("prepare.receivers", |_| FlatReceivers::new(scene, light)))
             }
             Variant::Volumes => {
-                let volumes = Volumes::new(casters, light, camera, &self.params, &mut report);
+                let volumes = Volumes::new(casters, light, camera, (&self.params, &skips), &mut report);
                 report.bytes = (volumes.bytes() + casters.bytes()) as u64;
                 Prepared::Volumes(Box::new(volumes))
             }
@@ -88,7 +104,7 @@ impl StencilVolumes {
                 scene,
                 light: *light,
                 camera: *camera,
-                skip,
+                skips,
                 tree: casters.tree.clone(),
                 prepared,
             },
@@ -111,16 +127,22 @@ impl PreparedVolumes<'_> {
     pub fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Report {
         let mut report = Report::default();
         let magnitude = self.scene.bounds().magnitude();
-        let receivers = Receivers { scene: self.scene, gbuffer, light: &self.light, magnitude };
+        let skip_unlit = self.skips.unlit;
+        let receivers = Receivers { scene: self.scene, gbuffer, light: &self.light, magnitude, skip_unlit };
         match &self.prepared {
             Prepared::Planar(flat) => {
-                cpu::planar::shade(flat, &receivers, &self.camera, self.skip, &mut report, visibility);
+                cpu::planar::shade(flat, &receivers, &self.camera, self.skips.unlit, &mut report, visibility);
             }
             Prepared::Volumes(volumes) => {
                 let work = cpu::shade(volumes, &receivers, &mut report, visibility);
                 report.skip("pixels the light cannot reach", work.unreached);
                 report.skip("tiles of one count", work.uniform);
                 report.skip("pixels no mask is before", work.free_of_masks);
+                report.skip("runs of edges beside a block", work.runs_skipped);
+                report.count("pairs of run and block", work.run_pairs);
+                report.count("pairs of side and tile", work.pairs);
+                report.count("pairs of side and pixel", work.pixel_pairs);
+                report.count("pixels traced", work.traced);
             }
         }
         report

@@ -43,8 +43,8 @@ pub struct VolumeParams {
     /// counted, which costs more, and for all pixels if there are more silhouette edges than [`crate::volumes::most_edges`]; no
     /// pixel changes. Off only to measure.
     pub rays: bool,
-    /// Leave out what cannot change the image: casters outside the region that matters or, on the CPU, in another's shadow;
-    /// receivers of `planar` that nobody sees.
+    /// Leave out what cannot change the image: all that [`Skips`](crate::Skips) lists, or nothing of it; and receivers of
+    /// `planar` that nobody sees.
     pub skip: bool,
 }
 

@@ -4,7 +4,7 @@ use glam::Vec3;
 #[cfg(feature = "gpu")]
 use scene_core::Camera;
 #[cfg(feature = "gpu")]
-use scene_core::gpu::{GpuGBuffer, GpuShadowQuery, GpuShadowTechnique, Recorder};
+use scene_core::gpu::{Gpu, GpuGBuffer, GpuShadowQuery, GpuShadowTechnique, Recorder};
 use scene_core::technique::{
     Capability, Description, Params, PreparedShadow, ShadowQuery, ShadowTechnique, Support, TechniqueError,
     TechniqueFromParams,
@@ -84,6 +84,13 @@ impl GpuShadowTechnique for StencilVolumesOnGpu {
         visibility: &wgpu::TextureView,
     ) -> Result<Report, TechniqueError> {
         StencilVolumesOnGpu::shade(self, recorder, camera, gbuffer, visibility)
+    }
+
+    fn counted(&mut self, gpu: &Gpu) -> Result<Report, TechniqueError> {
+        match self {
+            Self::Volumes(volumes) => volumes.counted(gpu),
+            Self::Planar(_) => Ok(Report::default()),
+        }
     }
 
     fn survives_camera(&self) -> bool {

@@ -17,7 +17,9 @@ use crate::crossing::{Edge, HomogeneousLight, back_cap, cap_crossing, crossing};
 use crate::masked::MaskedCasters;
 use crate::outline::{Screen, ScreenEdge};
 use crate::params::{Count, VolumeParams};
+use crate::runs::{RUN, Runs, Shaft};
 use crate::silhouette::extract_within;
+use crate::skips::Skips;
 
 /// A face turned to the light.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +43,8 @@ pub struct Volumes {
     pub sides: Vec<SideGroup>,
     /// The edges on the screen.
     pub outlines: Vec<ScreenEdge>,
+    /// The edges by runs, with bounds if these are asked.
+    pub runs: Runs,
     /// The faces of casters counted from infinity.
     pub caps: Vec<Cap>,
     /// Faces that may lie between the eye and the near plane, where they are not seen.
@@ -74,17 +78,20 @@ impl Volumes {
         casters: &Casters<'_>,
         light: &Light,
         camera: &Camera,
-        params: &VolumeParams,
+        (params, skips): (&VolumeParams, &Skips),
         report: &mut Report,
     ) -> Self {
-        let VolumeParams { count, rays, skip, .. } = *params;
+        let VolumeParams { count, rays, .. } = *params;
         let scene = casters.scene;
-        let relevant = report.time("prepare.relevance", |report| {
-            if skip { casters.relevant(light, camera, report) } else { casters.all() }
-        });
+        let relevant =
+            report.time("prepare.relevance", |report| casters.relevant(light, camera, skips, report));
         let facing = report.time("prepare.facing", |_| facing_in(casters, &relevant, light));
         let near = report.time("prepare.relevance", |_| near_casters(casters, light, camera));
-        let split = Split::new(casters, &facing, &near, count);
+        let split = match count {
+            // Nothing is proved: all casters need their caps.
+            Count::Auto if !skips.caps => Split::new(casters, &facing, &near, Count::ZFail),
+            count => Split::new(casters, &facing, &near, count),
+        };
         let most = if rays { most_edges(camera) } else { usize::MAX };
         let found = report.time("prepare.silhouette", |_| {
             let edges = (&casters.topology, &casters.runs);
@@ -101,11 +108,15 @@ impl Volumes {
         let (edges, from_eye) = found.unwrap_or_default();
         let homogeneous = HomogeneousLight::from(light.center());
         let screen = Screen::new(camera);
-        let (sides, outlines) = report.time("prepare.sides", |_| {
+        let (sides, outlines, runs) = report.time("prepare.sides", |_| {
             let sides: Vec<_> =
                 edges.par_chunks(LANES).with_min_len(64).map(|e| SideGroup::new(e, &homogeneous)).collect();
             let outlines: Vec<_> = edges.par_iter().with_min_len(512).map(|e| screen.project(e)).collect();
-            (sides, outlines)
+            let runs = match skips.bounded {
+                true => Runs::bounded(&edges, &outlines),
+                false => Runs::unbounded(edges.len()),
+            };
+            (sides, outlines, runs)
         });
         let turned = split.from_infinity.as_deref().filter(|_| !all_dense).unwrap_or(&[]);
         let caps: Vec<_> = report.time("prepare.caps", |_| {
@@ -135,6 +146,7 @@ impl Volumes {
             from_eye,
             sides,
             outlines,
+            runs,
             caps,
             near_caps,
             screen,
@@ -151,6 +163,7 @@ impl Volumes {
         size_of_val(&self.edges[..])
             + size_of_val(&self.sides[..])
             + size_of_val(&self.outlines[..])
+            + self.runs.bytes()
             + size_of_val(&self.caps[..])
             + size_of_val(&self.near_caps[..])
     }
@@ -165,13 +178,27 @@ impl Volumes {
             }
         };
         let sum_of = |edges: Range<usize>, from_eye: bool| -> Vec<Vec<i32>> {
-            let starts_of: Vec<usize> = edges.clone().step_by(EDGES_A_TASK).collect();
-            starts_of
-                .into_par_iter()
-                .map(|first| {
+            let groups = edges.start / (RUN * LANES)..edges.end.div_ceil(RUN * LANES);
+            let groups = groups.into_par_iter().filter(|_| !edges.is_empty());
+            groups
+                .map(|group| {
                     let mut sums = vec![0; starts.len()];
-                    let range = first..(first + EDGES_A_TASK).min(edges.end);
-                    dispatch!(level, simd => self.add_sides(simd, range, from_eye, starts, &mut sums));
+                    dispatch!(level, simd => {
+                        let within: Vec<u32> = starts
+                            .iter()
+                            .map(|start| {
+                                let way = if from_eye { start.from_eye } else { start.onward };
+                                self.runs.within(simd, group, &Shaft::plane(start.place, way, &self.light))
+                            })
+                            .collect();
+                        for run in 0..LANES {
+                            let range = self.runs.edges(group * LANES + run);
+                            let range = range.start.max(edges.start)..range.end.min(edges.end);
+                            let across = |&index: &usize| within[index] >> run & 1 == 1;
+                            let across: Vec<usize> = (0..starts.len()).filter(across).collect();
+                            self.add_sides(simd, range, from_eye, (starts, &across), &mut sums);
+                        }
+                    });
                     sums
                 })
                 .collect()
@@ -180,7 +207,7 @@ impl Volumes {
         partial(sum_of(self.from_eye..self.edges.len(), false), counts);
         let caps: Vec<Vec<i32>> = self
             .caps
-            .par_chunks(EDGES_A_TASK)
+            .par_chunks(CAPS_A_TASK)
             .map(|caps| {
                 let mut sums = vec![0; starts.len()];
                 dispatch!(level, simd => self.add_caps(simd, caps, starts, &mut sums));
@@ -196,7 +223,7 @@ impl Volumes {
         _simd: S,
         range: Range<usize>,
         from_eye: bool,
-        starts: &[Start],
+        (starts, across): (&[Start], &[usize]),
         sums: &mut [i32],
     ) {
         for index in range {
@@ -205,7 +232,8 @@ impl Volumes {
             let eye = self.screen.eye;
             let side = SideFromApex::new(edge, &self.light, eye);
             let eye_outside = edge.is_outside(plane, eye);
-            for (start, sum) in starts.iter().zip(&mut *sums) {
+            for &start in across {
+                let (start, sum) = (&starts[start], &mut sums[start]);
                 let outside = edge.is_outside(plane, start.place);
                 if from_eye {
                     if outside != eye_outside {
@@ -257,8 +285,8 @@ impl Volumes {
     }
 }
 
-/// Edges or caps of a task of [`Volumes::count_starts`].
-const EDGES_A_TASK: usize = 1024;
+/// Caps of a task of [`Volumes::count_starts`].
+const CAPS_A_TASK: usize = 1024;
 
 /// A point at which counting starts anew.
 #[derive(Clone, Copy, Debug)]

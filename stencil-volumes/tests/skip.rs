@@ -1,27 +1,30 @@
 //! Leaving out what cannot matter never changes an image, bit for bit, and is counted.
 
 use glam::{Affine3A, Vec3};
-use gnomon_stencil_volumes::{Casters, StencilVolumes, Variant, VolumeParams};
+use gnomon_stencil_volumes::{Casters, Skips, StencilVolumes, Variant, VolumeParams};
 use scene_core::geometry::ObjectFlags;
 use scene_core::{Camera, Light, Report, Scene, TriangleMesh, VisibilityImage, raster, scenes};
 
-/// Images with skipping on and off; the reports of the first.
+/// Images without skipping, with each kind alone and with all; the reports of the last, counted and traced as by default.
 fn compare(scene: &Scene, light: &Light, camera: &Camera, variant: Variant) -> Report {
     let gbuffer = raster::render_gbuffer(scene, camera);
     let casters = Casters::new(scene).expect("few triangles");
     let mut kept = Report::default();
-    let images = [true, false].map(|skip| {
-        let technique = StencilVolumes::new(VolumeParams { variant, skip, ..Default::default() });
-        let (prepared, mut report) = technique.prepare(&casters, light, camera);
-        let mut image = VisibilityImage::new(camera.width, camera.height);
-        report.merge(&prepared.shade(&gbuffer, &mut image));
-        if skip {
+    let mut first: Option<Vec<u32>> = None;
+    for rays in [false, true] {
+        for (name, skips) in Skips::EACH {
+            let params = VolumeParams { variant, rays, ..Default::default() };
+            let technique = StencilVolumes::new(params).with_skips(skips);
+            let (prepared, mut report) = technique.prepare(&casters, light, camera);
+            let mut image = VisibilityImage::new(camera.width, camera.height);
+            report.merge(&prepared.shade(&gbuffer, &mut image));
             kept = report;
+            let bits: Vec<u32> = image.values.iter().map(|v| v.to_bits()).collect();
+            let first = first.get_or_insert_with(|| bits.clone());
+            let wrong = bits.iter().zip(first).filter(|(a, b)| a != b).count();
+            assert_eq!(wrong, 0, "{light:?}, {variant:?}, rays {rays}, {name}");
         }
-        image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
-    });
-    let wrong = images[0].iter().zip(&images[1]).filter(|(a, b)| a != b).count();
-    assert_eq!(wrong, 0, "{light:?}, {variant:?}");
+    }
     kept
 }
 
@@ -34,6 +37,42 @@ fn views_of_the_street() {
     let report = compare(&setup.scene, &setup.lights[0], &camera, Variant::Volumes);
     assert!(report.skipped["caster triangles outside view"] > 0);
     assert!(report.skipped["caps"] > 0);
+}
+
+/// What each kind of skipping spares, in a scene that is counted: nothing else is spared with it.
+#[test]
+fn each_kind_spares_its_own_work() {
+    let setup = scenes::build("chess", 0.0).expect("built in");
+    let camera = setup.camera.with_size(192, 160);
+    let light = setup.lights[0];
+    let gbuffer = raster::render_gbuffer(&setup.scene, &camera);
+    let casters = Casters::new(&setup.scene).expect("few triangles");
+    let report = |skips| {
+        let technique = StencilVolumes::new(VolumeParams { rays: false, ..Default::default() });
+        let (prepared, mut report) = technique.with_skips(skips).prepare(&casters, &light, &camera);
+        let mut image = VisibilityImage::new(camera.width, camera.height);
+        report.merge(&prepared.shade(&gbuffer, &mut image));
+        let [skipped, counted] = [&report.skipped, &report.counted]
+            .map(|all| move |what: &str| all.get(what).copied().unwrap_or_default());
+        let kinds = [
+            skipped("caster triangles outside view"),
+            skipped("casters in another's shadow"),
+            skipped("runs of edges beside a block"),
+            skipped("pixels the light cannot reach"),
+            skipped("caps"),
+        ];
+        (kinds, counted("pairs of side and pixel"), counted("pairs of run and block"))
+    };
+    let (off, pixels, runs) = report(Skips::NONE);
+    assert_eq!(off, [0; 5]);
+    for (kind, (name, skips)) in Skips::EACH[1..6].iter().enumerate() {
+        let (found, ..) = report(*skips);
+        let others = (0..5).filter(|&other| other != kind).all(|other| found[other] == 0);
+        assert!(others, "{name}: {found:?}");
+    }
+    let (all, fewer_pixels, fewer_runs) = report(Skips::ALL);
+    assert!(all[2] > 0 && all[3] > 0 && all[4] > 0, "{all:?}");
+    assert!(fewer_pixels < pixels && fewer_runs < runs, "{fewer_pixels} {pixels}, {fewer_runs} {runs}");
 }
 
 #[test]

@@ -247,6 +247,15 @@ impl EdgeTopology {
         &self.incident[self.first[edge] as usize..self.first[edge + 1] as usize]
     }
 
+    /// The faces of a range of edges, edge by edge.
+    ///
+    /// # Panics
+    /// If there are no such edges.
+    #[inline]
+    pub fn faces_of(&self, edges: Range<usize>) -> &[Incidence] {
+        &self.incident[self.first[edges.start] as usize..self.first[edges.end] as usize]
+    }
+
     /// m(e): what an edge's faces, turned to the light by `facing`, add up to.
     ///
     /// # Panics

@@ -186,6 +186,7 @@ impl HeadlessView<'_> {
             technique.shade(recorder, camera, &gbuffer, &view)
         })?;
         report.merge(&shaded);
+        report.merge(&technique.counted(gpu)?);
         report.gpu = Some(GpuUse { adapter: gpu.adapter_name(), features: gpu.features() });
         let visibility = gpu.read_visibility(visibility, gbuffer)?;
         Ok(HeadlessRun { visibility, report, prepare_ms, shade_ms })

@@ -1,6 +1,6 @@
 //! The interface of a technique on the GPU: prepare, then shade, both recorded into the caller's encoder.
 
-use super::{GpuGBuffer, GpuScene, Recorder};
+use super::{Gpu, GpuGBuffer, GpuScene, Recorder};
 use crate::technique::TechniqueError;
 use crate::{Camera, Light, Report};
 
@@ -44,6 +44,15 @@ pub trait GpuShadowTechnique: Send {
         gbuffer: &GpuGBuffer<'_>,
         visibility: &wgpu::TextureView,
     ) -> Result<Report, TechniqueError>;
+
+    /// What the last frame left out and counted on the device, where nobody but the device knows it. Waits for the device: for
+    /// measurements, not for a frame.
+    ///
+    /// # Errors
+    /// What went wrong on the device.
+    fn counted(&mut self, _gpu: &Gpu) -> Result<Report, TechniqueError> {
+        Ok(Report::default())
+    }
 
     /// Whether the preparation still holds when only the camera moves.
     fn survives_camera(&self) -> bool;

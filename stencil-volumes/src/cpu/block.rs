@@ -11,6 +11,7 @@ use super::{Asked, BLOCK, BLOCK_TILES, Receivers, TILE, Work};
 use crate::bounds::{BoxGroup, LANES};
 use crate::crossing::{SideFromApex, crossing};
 use crate::outline::SeenPoint;
+use crate::runs::Shaft;
 use crate::volumes::{Start, Volumes};
 
 /// Tiles of a block.
@@ -115,7 +116,11 @@ impl Block {
         let side = (TILE * SnappedView::STEPS as usize) as f64;
         let reach = ((TILE - 1) * SnappedView::STEPS as usize) as f64;
         let depth = self.tiles.iter().map(|tile| tile.depth).fold(f64::NEG_INFINITY, f64::max);
-        for (edge, outline) in (0_u32..).zip(&volumes.outlines) {
+        let runs = (0..volumes.runs.len())
+            .filter(|&run| volumes.runs.may_pass(run, self.min, self.max, depth))
+            .flat_map(|run| volumes.runs.edges(run));
+        for edge in runs {
+            let outline = &volumes.outlines[edge];
             if !outline.may_pass(self.min, self.max, depth) {
                 continue;
             }
@@ -136,7 +141,7 @@ impl Block {
                     }
                 }
             }
-            self.passing.push((edge, passed));
+            self.passing.push((edge as u32, passed));
         }
         counted
     }
@@ -147,7 +152,7 @@ impl Block {
         let tile = &mut self.tiles[index];
         for i in 0..tile.len {
             // The place is an f32 that was widened.
-            let lit = !volumes.tree.is_occluded(tile.place(i).as_vec3(), light);
+            let lit = tile.unlit >> i & 1 == 0 && !volumes.tree.is_occluded(tile.place(i).as_vec3(), light);
             let pixel = tile.pixel[i] as usize;
             self.lit[at[1] + pixel / TILE] |= u64::from(lit) << (at[0] + pixel % TILE);
         }
@@ -177,11 +182,13 @@ impl Block {
                     continue;
                 }
                 let pixel = y * width + x;
-                match receivers.ask(pixel) {
+                let asked = receivers.ask(pixel);
+                let unlit = asked == Asked::Dark;
+                match asked {
                     Asked::Nothing => {}
                     Asked::Lit => self.lit[by] |= 1 << bx,
-                    Asked::Dark => self.work.unreached += 1,
-                    Asked::Yes => {
+                    Asked::Dark if receivers.skip_unlit => self.work.unreached += 1,
+                    Asked::Dark | Asked::Yes => {
                         let origin = shadow_origin(
                             gbuffer.position[pixel],
                             gbuffer.normal[pixel],
@@ -189,7 +196,7 @@ impl Block {
                         );
                         // Where rays see no shadow there is none to be counted.
                         if !origin.is_finite() {
-                            self.lit[by] |= 1 << bx;
+                            self.lit[by] |= u64::from(!unlit) << bx;
                             continue;
                         }
                         if seen.triangle != gbuffer.triangle[pixel] {
@@ -205,11 +212,12 @@ impl Block {
                             || volumes.crosses_near_cap(from_eye)
                         {
                             let lit = !volumes.tree.is_occluded(origin, receivers.light.center());
-                            self.lit[by] |= u64::from(lit) << bx;
+                            self.lit[by] |= u64::from(lit && !unlit) << bx;
                             self.work.traced += 1;
                             continue;
                         }
-                        tile.push(row * TILE + column, origin.to_array(), f64::from(gbuffer.depth[pixel]));
+                        let depth = f64::from(gbuffer.depth[pixel]);
+                        tile.push(row * TILE + column, origin.to_array(), depth, unlit);
                     }
                 }
             }
@@ -272,7 +280,7 @@ impl Block {
                     self.work.traced += 1;
                     // The place is an f32 that was widened.
                     !volumes.tree.is_occluded(tile.place(i).as_vec3(), light)
-                } else if starts[index] + tile.count(i) != 0 {
+                } else if starts[index] + tile.count(i) != 0 || tile.unlit >> i & 1 == 1 {
                     false
                 } else if volumes.masked.may_block(tile.place(i), light) {
                     self.work.asked_of_masks += 1;
@@ -282,6 +290,7 @@ impl Block {
                     true
                 };
                 let pixel = tile.pixel[i] as usize;
+                let lit = lit && tile.unlit >> i & 1 == 0;
                 self.lit[at[1] + pixel / TILE] |= u64::from(lit) << (at[0] + pixel % TILE);
             }
         }
@@ -311,7 +320,21 @@ impl Block {
             }
         }
         let (center, half) = ((low + high) * 0.5, (high - low) * 0.5);
-        for (group, side) in volumes.sides.iter().enumerate() {
+        let shaft = Shaft::to_light(low, high, &volumes.light);
+        let mut groups = Vec::new();
+        for group in 0..volumes.runs.len().div_ceil(LANES) {
+            let mut within = volumes.runs.within(simd, group, &shaft);
+            self.work.run_pairs += u64::from(within.count_ones());
+            while within != 0 {
+                let run = group * LANES + within.trailing_zeros() as usize;
+                within &= within - 1;
+                let edges = volumes.runs.edges(run);
+                groups.push(edges.start / LANES..edges.end.div_ceil(LANES));
+            }
+        }
+        self.work.runs_skipped += volumes.runs.len() as u64 - self.work.run_pairs;
+        for group in groups.into_iter().flatten() {
+            let side = &volumes.sides[group];
             let mut found = side.may_cross_box(simd, center, half);
             while found != 0 {
                 let lane = found.trailing_zeros() as usize;
@@ -326,6 +349,7 @@ impl Block {
                         if counted[index] <= volumes.dense {
                             self.tiles[index].add_side(simd, edge, &volumes.light);
                             self.work.pairs += 1;
+                            self.work.pixel_pairs += self.tiles[index].len as u64;
                         }
                     }
                     let mut tiles = side.may_cross_boxes(simd, lane, &chords[row]);
@@ -383,6 +407,7 @@ impl Block {
                     counted[index] += 1;
                     self.tiles[index].add_link(simd, edge, outline, eye);
                     self.work.pairs += 1;
+                    self.work.pixel_pairs += self.tiles[index].len as u64;
                 }
             }
         }

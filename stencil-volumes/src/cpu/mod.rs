@@ -55,8 +55,14 @@ pub struct Work {
     pub asked_of_masks: u64,
     /// Lit pixels with no such caster in the way, in a scene that has some.
     pub free_of_masks: u64,
-    /// Pairs of a side and a tile that were counted pixel by pixel.
+    /// Pairs of a side or an edge on the screen and a tile that were counted pixel by pixel.
     pub pairs: u64,
+    /// The same with each of the tile's pixels.
+    pub pixel_pairs: u64,
+    /// Pairs of a run of edges and a block whose edges were asked one by one.
+    pub run_pairs: u64,
+    /// Those of which bounds said that none matters there.
+    pub runs_skipped: u64,
 }
 
 impl AddAssign for Work {
@@ -69,6 +75,9 @@ impl AddAssign for Work {
         self.asked_of_masks += other.asked_of_masks;
         self.free_of_masks += other.free_of_masks;
         self.pairs += other.pairs;
+        self.pixel_pairs += other.pixel_pairs;
+        self.run_pairs += other.run_pairs;
+        self.runs_skipped += other.runs_skipped;
     }
 }
 
@@ -83,6 +92,8 @@ pub struct Receivers<'a> {
     pub light: &'a Light,
     /// Largest coordinate of the scene.
     pub magnitude: f32,
+    /// Whether pixels that the light cannot reach are left out.
+    pub skip_unlit: bool,
 }
 
 /// What is known of a pixel before any counting.

@@ -29,6 +29,8 @@ pub(super) struct Tile {
     counts: Option<Box<[f64; PIXELS]>>,
     /// Bits of those that are so close to an edge that they are traced.
     pub(super) close: u64,
+    /// Bits of those that the light cannot reach.
+    pub(super) unlit: u64,
     /// Centre of the tile's first pixel, in steps.
     pub(super) corner: [f64; 2],
     /// Greatest depth.
@@ -43,6 +45,7 @@ impl Tile {
         start: 0,
         counts: None,
         close: 0,
+        unlit: 0,
         corner: [0.0; 2],
         depth: f64::NEG_INFINITY,
     };
@@ -57,8 +60,9 @@ impl Tile {
     }
 
     /// Adds an asked pixel; there is room for all of a tile's.
-    pub(super) fn push(&mut self, pixel: usize, place: [f32; 3], depth: f64) {
+    pub(super) fn push(&mut self, pixel: usize, place: [f32; 3], depth: f64, unlit: bool) {
         let at = self.len;
+        self.unlit |= u64::from(unlit) << at;
         for (axis, coordinate) in self.place.iter_mut().zip(place) {
             axis[at] = coordinate;
         }

@@ -27,18 +27,20 @@ pub(super) fn shade(
                 let first = (band * TILE + row) * width;
                 for (x, value) in values.iter_mut().enumerate().skip(tile * TILE).take(TILE) {
                     let pixel = first + x;
-                    *value = match receivers.ask(pixel) {
+                    let asked = receivers.ask(pixel);
+                    *value = match asked {
                         Asked::Nothing => f32::NAN,
                         Asked::Lit => 1.0,
-                        Asked::Dark => {
+                        Asked::Dark if receivers.skip_unlit => {
                             work.unreached += 1;
                             0.0
                         }
-                        Asked::Yes => {
+                        Asked::Dark | Asked::Yes => {
                             work.traced += 1;
                             let (place, normal) = (gbuffer.position[pixel], gbuffer.normal[pixel]);
                             let origin = shadow_origin(place, normal, receivers.magnitude);
-                            f32::from(u8::from(!volumes.tree.is_occluded(origin, light)))
+                            let lit = !volumes.tree.is_occluded(origin, light);
+                            f32::from(u8::from(lit && asked == Asked::Yes))
                         }
                     };
                 }

@@ -37,8 +37,12 @@ pub struct VolumesUniform {
     pub dense: u32,
     /// Edges above which all pixels are.
     pub most_edges: u32,
-    /// Zero.
-    pub padding: [u32; 3],
+    /// 1 if pixels that the light cannot reach are left out.
+    pub skip_unlit: u32,
+    /// 1 if runs of edges are asked before their edges.
+    pub skip_runs: u32,
+    /// Ranges of triangles that lie in another's shadow.
+    pub shadowed: u32,
 }
 
 /// `Projection` of `planar.wesl`.
@@ -87,7 +91,10 @@ mod tests {
                 solid_nodes,
                 nodes,
                 dense,
-                most_edges
+                most_edges,
+                skip_unlit,
+                skip_runs,
+                shadowed
             ]
         );
         assert_layout!(

@@ -4,6 +4,7 @@
 //! | --- | --- | --- |
 //! | `prepare.facing` | facing, once a triangle; faces between eye and light; faces before the near plane | `volumes::facing_in` |
 //! | `prepare.silhouette` | edges whose faces do not cancel, by signed multiplicity | [`silhouette`](crate::silhouette) |
+//! | `prepare.runs` | boxes around runs of 64 of these | [`runs`](crate::runs) |
 //! | `shade.ask` | which pixels hang on the casters | `cpu::Receivers::ask` |
 //! | `shade.blocks` | edges against blocks of 64 × 64 pixels | `cpu::block` |
 //! | `shade.tiles` | the rest against tiles of 8 × 8 pixels, and what is left against pixels | `cpu::tile` |
@@ -28,10 +29,11 @@
 //! which wgpu checks every indirect dispatch. No call less would be recorded.
 //!
 //! # What is skipped
-//! With `skip`, faces outside the region that can shadow what is seen are turned by nobody, so they have no edges. The region's
-//! planes come from the objects' boxes, the only thing beside recording that a frame asks of the CPU. Its report counts objects
-//! outside; what blocks, tiles and the facing pass leave out is known on the device alone, and nothing is read back for a
-//! report.
+//! All that [`Skips`](crate::Skips) lists. Faces outside the region that can shadow what is seen, or of casters in another's shadow,
+//! are turned by nobody, so they have no edges; the region's planes and the shadowed casters come from the objects' boxes, the only
+//! thing beside recording that a frame asks of the CPU. Blocks ask runs of edges before their edges, pixels that the light cannot
+//! reach are not counted, and no caps ever are. What is left out is counted in a buffer, a few atomic additions a workgroup; a frame
+//! never reads it: [`GpuShadowTechnique::counted`](scene_core::gpu::GpuShadowTechnique::counted) does, for who wants a report.
 //!
 //! # Why the eye's count is all that z-fail needs
 //! The count at a point is the count at the eye plus the crossings on the way from there. The first is one number a frame:

@@ -1,30 +1,33 @@
 //! Shadow volumes on the GPU: buffers, pipelines and the order of the passes.
 
-use bytemuck::Zeroable as _;
 use glam::Vec4;
 use scene_core::gpu::{
-    Bound, ComputePass, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder,
+    Bound, ComputePass, Gpu, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder,
     SceneBindings, SceneGroups, VisibilityPass, VisibilityPassParts, WorkBuffer, binding, binding_limit,
 };
 use scene_core::light::LightPoint;
 use scene_core::relevance::CasterRegion;
 use scene_core::technique::{Params as _, TechniqueError};
-use scene_core::{Camera, Report, Scene};
+use scene_core::{Camera, Light, Report, Scene};
 
 use super::layout::VolumesUniform;
 use super::shaders;
 use super::tables::{Tables, TablesError};
-use crate::casters::near_box;
+use crate::casters::{in_anothers_shadow, near_box};
 use crate::cpu::{BLOCK, TILE};
+use crate::runs::RUN;
 use crate::volumes::{DENSE, most_edges};
-use crate::{Count, VolumeParams};
+use crate::{Count, Skips, VolumeParams};
 
 /// Bytes that the lists of edges of all blocks may take together. A block that has no room for its edges tells its
 /// tiles to take all there are.
 const LISTS: u64 = 64 << 20;
 
 /// Words of `counters`.
-const COUNTERS: u64 = 256;
+const COUNTERS: u64 = 276;
+
+/// The first word that `shade` counts in: `UNLIT_PIXELS` of `volumes.wesl`.
+const SHADE_COUNTS: u64 = 264;
 
 /// Edges that are counted at most, also if `rays` is off: 64 invocations go through them together. Drivers end a dispatch that
 /// takes too long, and Mesa's software ones all loops of an invocation after 65,535 rounds in sum; here are 2¹⁴ over edges and
@@ -50,21 +53,25 @@ enum Binds {
 #[derive(Debug)]
 pub struct VolumesOnGpu {
     params: VolumeParams,
+    skips: Skips,
     list_bytes: u64,
     tables: Option<Tables>,
     settings: HeldBuffer,
     region: HeldBuffer,
+    shadowed: HeldBuffer,
     facing: WorkBuffer,
     counters: WorkBuffer,
     edges: WorkBuffer,
     pixels: WorkBuffer,
     lists: WorkBuffer,
+    runs: WorkBuffer,
     no_masks: HeldBuffer,
     no_cutouts: HeldGroup,
     scene: SceneBindings,
     receivers: Receivers,
     find_facing: Pass,
     extract: Pass,
+    bound_runs: Pass,
     ask: Pass,
     list_edges: Pass,
     count: Pass,
@@ -109,7 +116,7 @@ impl VolumesOnGpu {
             shaders::FACING,
             "find_facing",
             Binds::Triangles,
-            &[READ, WRITE, WRITE, READ],
+            &[READ, WRITE, WRITE, READ, READ],
         );
         let extract = pass(
             "volumes silhouette",
@@ -118,10 +125,12 @@ impl VolumesOnGpu {
             Binds::Triangles,
             &[READ, READ, READ, READ, WRITE, WRITE],
         );
-        let ask = pass("volumes ask", shaders::ASK, "ask", lit, &[READ, READ, READ, WRITE]);
+        let bound_runs =
+            pass("volumes runs", shaders::RUNS, "bound_runs", Binds::Triangles, &[READ, READ, WRITE]);
+        let ask = pass("volumes ask", shaders::ASK, "ask", lit, &[READ, READ, WRITE, WRITE]);
         let list_edges =
-            pass("volumes blocks", shaders::BLOCKS, "list_edges", lit, &[READ, READ, READ, WRITE]);
-        let count = pass("volumes tiles", shaders::TILES, "count", lit, &[READ, READ, WRITE, READ]);
+            pass("volumes blocks", shaders::BLOCKS, "list_edges", lit, &[READ, WRITE, READ, WRITE, READ]);
+        let count = pass("volumes tiles", shaders::TILES, "count", lit, &[READ, WRITE, WRITE, READ]);
         let trace = pass("volumes rays", shaders::RAYS, "trace", Binds::All, &[READ, READ, WRITE]);
         let write_group = HeldGroup::new(device, "volumes write", stages, &[binding::UNIFORM, READ]);
         let write = VisibilityPass::new(
@@ -138,21 +147,25 @@ impl VolumesOnGpu {
         );
         Self {
             params,
+            skips: Skips::new(params.skip),
             list_bytes: LISTS,
             tables: None,
             settings: HeldBuffer::uniform("volumes"),
             region: HeldBuffer::storage("region of casters"),
+            shadowed: HeldBuffer::storage("casters in another's shadow"),
             facing: WorkBuffer::new("facings"),
             counters: WorkBuffer::new("counters"),
             edges: WorkBuffer::new("edges of the silhouette"),
             pixels: WorkBuffer::new("states of pixels"),
             lists: WorkBuffer::new("edges of blocks"),
+            runs: WorkBuffer::new("runs of edges"),
             no_masks: HeldBuffer::storage("no masks"),
             no_cutouts: HeldGroup::new(device, "no cut-outs", stages, &[READ, READ]),
             scene,
             receivers,
             find_facing,
             extract,
+            bound_runs,
             ask,
             list_edges,
             count,
@@ -183,17 +196,20 @@ impl VolumesOnGpu {
                 },
             )?,
         };
-        let uniform = self.uniform(&tables, query, device);
+        let (planes, shadowed) = report.time("prepare.relevance", |report| {
+            let planes = if self.skips.outside { region_planes(geometry, query, report) } else { Vec::new() };
+            let shadowed =
+                if self.skips.shadowed { shadowed_ranges(geometry, query.light, report) } else { Vec::new() };
+            (planes, shadowed)
+        });
+        let uniform = self.uniform(&tables, query, device, shadowed.len() as u32);
         let settings = self.settings.get(device, bytemuck::bytes_of(&uniform));
         let facing = self.facing.get(device, 4 * u64::from(tables.triangles))?;
         let counters = self.counters.get(device, 4 * COUNTERS)?;
         let edges = self.edges.get(device, 16 * u64::from(tables.edges))?;
         recorder.encoder.clear_buffer(&counters, 0, None);
-        let planes = report.time("prepare.relevance", |report| match self.params.skip {
-            true => region_planes(geometry, query, report),
-            false => Vec::new(),
-        });
         let region = self.region.get(device, bytemuck::cast_slice(&planes));
+        let shadowed = self.shadowed.get(device, bytemuck::cast_slice(&shadowed));
         let scene = self.scene.groups(device, &query.scene);
         let triangles = Some(&scene.triangles);
 
@@ -203,23 +219,32 @@ impl VolumesOnGpu {
             facing.clone().into(),
             counters.clone().into(),
             region.into(),
+            shadowed.into(),
         ];
         let own = self.find_facing.own.get(device, &own);
         let groups = [Some(&own), triangles];
         self.find_facing.pass.record(recorder, "prepare.facing", &groups, workgroups(tables.triangles));
 
         let own = [
-            settings.into(),
+            settings.clone().into(),
             tables.vertices.clone().into(),
             tables.first.clone().into(),
             tables.incident.clone().into(),
             facing.into(),
-            counters.into(),
-            edges.into(),
+            counters.clone().into(),
+            edges.clone().into(),
         ];
         let own = self.extract.own.get(device, &own);
         let groups = [Some(&own), triangles];
         self.extract.pass.record(recorder, "prepare.silhouette", &groups, workgroups(tables.edges));
+
+        if self.skips.bounded {
+            let runs = self.runs.get(device, run_bytes(&tables))?;
+            let own = [settings.into(), edges.into(), counters.into(), runs.into()];
+            let own = self.bound_runs.own.get(device, &own);
+            let groups = [Some(&own), triangles];
+            self.bound_runs.pass.record(recorder, "prepare.runs", &groups, workgroups(tables.edges));
+        }
 
         let cutouts = scene.cutouts.clone().unwrap_or_else(|| {
             let none: Bound = self.no_masks.get(device, &[]).into();
@@ -232,7 +257,13 @@ impl VolumesOnGpu {
         Ok(report)
     }
 
-    fn uniform(&self, tables: &Tables, query: &GpuShadowQuery<'_>, device: &wgpu::Device) -> VolumesUniform {
+    fn uniform(
+        &self,
+        tables: &Tables,
+        query: &GpuShadowQuery<'_>,
+        device: &wgpu::Device,
+        shadowed: u32,
+    ) -> VolumesUniform {
         let (camera, rays) = (query.camera, self.params.rays);
         let near = near_box(camera);
         let light_point = match query.light.center() {
@@ -259,7 +290,9 @@ impl VolumesOnGpu {
             nodes: tables.all_nodes,
             dense: if rays { DENSE } else { MOST_EDGES / 64 },
             most_edges: MOST_EDGES.min(if rays { most_edges(camera) as u32 } else { u32::MAX }),
-            ..VolumesUniform::zeroed()
+            skip_unlit: u32::from(self.skips.unlit),
+            skip_runs: u32::from(self.skips.bounded),
+            shadowed,
         }
     }
 
@@ -287,7 +320,9 @@ impl VolumesOnGpu {
         let settings: Bound = self.settings.get(device, bytemuck::bytes_of(uniform)).into();
         let pixels: Bound = self.pixels.get(device, 4 * (4 + 2 * count))?.into();
         let lists: Bound = self.lists.get(device, 4 * blocks * (u64::from(uniform.capacity) + 2))?.into();
-        let counters: Bound = self.counters.get(device, 4 * COUNTERS)?.into();
+        let counters = self.counters.get(device, 4 * COUNTERS)?;
+        recorder.encoder.clear_buffer(&counters, 4 * SHADE_COUNTS, None);
+        let counters: Bound = counters.into();
         let edges: Bound = self.edges.get(device, 16 * u64::from(tables.edges))?.into();
         let nodes: Bound = tables.nodes.clone().into();
         let leaves: Bound = tables.leaves.clone().into();
@@ -299,7 +334,8 @@ impl VolumesOnGpu {
         let groups = [Some(&own), triangles, None, receivers];
         self.ask.pass.record(recorder, "shade.ask", &groups, [tile_columns, tile_rows, 1]);
 
-        let own = [settings.clone(), edges.clone(), counters.clone(), pixels.clone(), lists.clone()];
+        let runs: Bound = self.runs.get(device, run_bytes(tables))?.into();
+        let own = [settings.clone(), edges.clone(), counters.clone(), pixels.clone(), lists.clone(), runs];
         let own = self.list_edges.own.get(device, &own);
         let groups = [Some(&own), triangles, None, receivers];
         self.list_edges.pass.record(recorder, "shade.blocks", &groups, [columns, rows, 1]);
@@ -324,8 +360,35 @@ impl VolumesOnGpu {
     }
 
     fn bytes(&self) -> u64 {
-        let work = [&self.facing, &self.counters, &self.edges, &self.pixels, &self.lists];
+        let work = [&self.facing, &self.counters, &self.edges, &self.pixels, &self.lists, &self.runs];
         work.into_iter().map(WorkBuffer::bytes).sum::<u64>() + self.tables.as_ref().map_or(0, Tables::bytes)
+    }
+
+    /// What the last frame left out and counted, by the names of the CPU path. Waits for the device.
+    ///
+    /// # Errors
+    /// What went wrong on the device.
+    pub fn counted(&mut self, gpu: &Gpu) -> Result<Report, TechniqueError> {
+        let mut report = Report::default();
+        let words: Vec<u32> = gpu.read_buffer(&self.counters(&gpu.device)?)?;
+        let pixels: Vec<u32> = gpu.read_buffer(&self.pixels(&gpu.device)?)?;
+        let word = |index: usize| u64::from(words[index]);
+        report.skip("caster triangles outside view", word(256));
+        report.skip("caster triangles in another's shadow", word(257));
+        report.skip("caps", word(258));
+        report.skip("pixels the light cannot reach", word(264));
+        report.skip("tiles of one count", word(266));
+        report.skip("runs of edges beside a block", word(267));
+        report.count("pairs of run and block", word(268));
+        report.count("pairs of side and tile", word(270) | word(271) << 32);
+        report.count("pairs of side and pixel", word(272) | word(273) << 32);
+        report.count("pixels traced", pixels.first().map_or(0, |&count| u64::from(count)));
+        Ok(report)
+    }
+
+    /// Other skips than [`VolumeParams::skip`] says, to measure one by one. No image changes.
+    pub fn set_skips(&mut self, skips: Skips) {
+        self.skips = skips;
     }
 
     /// Bytes that the lists of edges of all blocks may take together, 64 MiB if nothing is said. Less costs time, no pixel.
@@ -378,6 +441,21 @@ fn region_planes(scene: &Scene, query: &GpuShadowQuery<'_>, report: &mut Report)
         unit.is_finite().then_some(unit)
     });
     planes.collect()
+}
+
+/// The triangles of casters that lie wholly in another's shadow, as the facing pass reads them; books the casters.
+fn shadowed_ranges(scene: &Scene, light: &Light, report: &mut Report) -> Vec<[u32; 2]> {
+    let shadowed = in_anothers_shadow(scene, light);
+    report.skip("casters in another's shadow", shadowed.len() as u64);
+    let triangles = shadowed.iter().map(|&id| &scene.objects()[id as usize].triangles);
+    let mut ranges: Vec<[u32; 2]> = triangles.map(|t| [t.start as u32, t.end as u32]).collect();
+    ranges.sort_unstable();
+    ranges
+}
+
+/// Bytes of the boxes around all runs that there may be: room for one where there are no edges, as a binding holds an element.
+fn run_bytes(tables: &Tables) -> u64 {
+    32 * u64::from(tables.edges).div_ceil(RUN as u64).max(1)
 }
 
 /// Workgroups of 64 for so many elements, in two dimensions.
