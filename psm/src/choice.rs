@@ -26,25 +26,6 @@ pub enum Parametrisation {
     Fitted,
 }
 
-/// A parametrisation and what it would give.
-#[derive(Clone, Debug)]
-pub struct Candidate {
-    /// Which it is.
-    pub parametrisation: Parametrisation,
-    /// Its forms.
-    pub warp: Warp,
-    /// Mean of [`aliasing::expected_error`] over the samples near shadows, scene units.
-    pub measure: f64,
-    values: Vec<f64>,
-}
-
-impl Candidate {
-    fn new(parametrisation: Parametrisation, warp: Warp, values: Vec<f64>) -> Self {
-        let measure = values.iter().sum::<f64>() / values.len().max(1) as f64;
-        Self { parametrisation, warp, measure, values }
-    }
-}
-
 /// What a warp is made for: one image of the light and who looks at it.
 pub struct Situation<'a> {
     /// The light's own image.
@@ -66,34 +47,32 @@ pub struct Situation<'a> {
 }
 
 impl Situation<'_> {
-    /// Those that `variant` may take, uniform first. A `psm` that has no shift is left out.
-    pub fn candidates(&self, variant: Variant) -> Vec<Candidate> {
+    /// What `variant` takes. A `psm` that has no shift is uniform.
+    pub fn chosen(&self, variant: Variant) -> (Parametrisation, Warp) {
         let uniform = || (Parametrisation::Uniform, self.image.warp);
-        let psm = |from: f64| {
-            let warp = |shift| post_perspective::warp(self.frame, self.image.light, shift, &self.receivers);
-            virtual_camera::least(from, self.depths[1], warp)
-                .map(|(shift, warp)| (Parametrisation::Psm { shift }, warp))
-        };
-        let lispsm = || {
-            let warp = lispsm::warp(&self.image, self.frame, self.depths, &self.receivers);
-            (Parametrisation::Lispsm, warp)
-        };
-        let warps: Vec<_> = match variant {
-            Variant::Uniform => vec![uniform()],
-            Variant::Psm => vec![psm(self.papers_shift).unwrap_or_else(uniform)],
-            Variant::Lispsm => vec![lispsm()],
-            Variant::Auto => {
-                let warp = fitted::least(
-                    &self.image.warp,
-                    &self.window(&self.image.warp),
-                    &self.spread().collect::<Vec<_>>(),
-                    self.near_shadows,
-                );
-                let fitted = warp.map(|warp| (Parametrisation::Fitted, warp));
-                std::iter::once(uniform()).chain(fitted).collect()
+        match variant {
+            Variant::Auto => self.fitted().unwrap_or_else(uniform),
+            Variant::Uniform => uniform(),
+            Variant::Psm => {
+                let warp =
+                    |shift| post_perspective::warp(self.frame, self.image.light, shift, &self.receivers);
+                let found = virtual_camera::least(self.papers_shift, self.depths[1], warp);
+                found.map_or_else(uniform, |(shift, warp)| (Parametrisation::Psm { shift }, warp))
             }
-        };
-        warps.into_iter().map(|(parametrisation, warp)| self.measured(parametrisation, warp)).collect()
+            Variant::Lispsm => {
+                let warp = lispsm::warp(&self.image, self.frame, self.depths, &self.receivers);
+                (Parametrisation::Lispsm, warp)
+            }
+        }
+    }
+
+    /// The variant `auto`: the map that promises the least error, if that can be relied on to be less than the even map's.
+    fn fitted(&self) -> Option<(Parametrisation, Warp)> {
+        let window = self.window(&self.image.warp);
+        let receivers: Vec<_> = self.spread().collect();
+        let least = fitted::least(&self.image.warp, &window, &receivers, self.near_shadows)?;
+        is_better(&self.errors(&self.image.warp), &self.errors(&least))
+            .then_some((Parametrisation::Fitted, least))
     }
 
     /// All receivers that are known by place.
@@ -106,68 +85,40 @@ impl Situation<'_> {
         self.spread().fold(Window::EMPTY, |window, point| window.with(warp.place(point))).widened()
     }
 
-    /// A warp, measured in the window that these receivers would give it.
-    fn measured(&self, parametrisation: Parametrisation, warp: Warp) -> Candidate {
-        let window = self.window(&warp);
-        let errors = aliasing::expected_errors(&warp, &window, self.map_size, self.near_shadows);
-        Candidate::new(parametrisation, warp, errors)
+    /// What is expected of a warp at the samples near shadows, in the window that these receivers would give it.
+    fn errors(&self, warp: &Warp) -> Vec<f64> {
+        aliasing::expected_errors(warp, &self.window(warp), self.map_size, self.near_shadows)
     }
 }
 
-/// Uniform is kept for gains below this share: by so much error strays from the measure. It is the standard deviation of
+/// The even map is kept for gains below this share: by so much error strays from the measure. It is the standard deviation of
 /// ln(wrong pixels / measure) over rows that are not those of the README: the example `fresh_views` prints it.
 const LEAST_GAIN: f64 = 1.0 / 6.0;
 
-/// Among the others what differs by less than this share is the same, and the first of them is taken: rounding decides nothing.
-const SAME: f64 = 1.0 / 1024.0;
-
-/// The candidate with the least measure. The first (uniform) is kept unless another one's mean is lower by a share of
-/// 1/6 and by twice the standard error of the difference, sample by sample: what chance could have done is no
-/// reason to warp.
-pub fn choose(candidates: Vec<Candidate>) -> Option<Candidate> {
-    let mut candidates = candidates.into_iter();
-    let first = candidates.next()?;
-    let is_better = |other: &Candidate| {
-        let n = first.values.len() as f64;
-        let gain = || first.values.iter().zip(&other.values).map(|(a, b)| a - b);
-        let mean = gain().sum::<f64>() / n;
-        let variance = gain().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-        mean > 2.0 * (variance / n).sqrt() + first.measure * LEAST_GAIN
-    };
-    let better = |best: Option<Candidate>, other: Candidate| match best {
-        Some(best) if other.measure >= best.measure * (1.0 - SAME) => Some(best),
-        _ => Some(other),
-    };
-    let best = candidates.filter(is_better).fold(None, better);
-    Some(best.unwrap_or(first))
+/// Whether a map with the errors `other` is better than the even one with those, sample by sample: if their mean is lower by
+/// [`LEAST_GAIN`] and by twice the standard error of the difference. What chance could have done is no reason to warp.
+fn is_better(even: &[f64], other: &[f64]) -> bool {
+    let count = even.len() as f64;
+    let gains = || even.iter().zip(other).map(|(a, b)| a - b);
+    let mean = gains().sum::<f64>() / count;
+    let variance = gains().map(|g| (g - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    mean > 2.0 * (variance / count).sqrt() + LEAST_GAIN * even.iter().sum::<f64>() / count
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec4;
-
     use super::*;
 
-    fn candidate(parametrisation: Parametrisation, values: &[f64]) -> Candidate {
-        let warp = Warp { x: DVec4::X, y: DVec4::Y, w: DVec4::W };
-        Candidate::new(parametrisation, warp, values.to_vec())
-    }
-
     #[test]
-    fn the_best_is_taken_unless_chance_could_have_made_it() {
-        let uniform = || candidate(Parametrisation::Uniform, &[4.0, 4.0, 5.0, 3.0, 4.0]);
-        let better = candidate(Parametrisation::Lispsm, &[2.0, 2.1, 2.5, 1.5, 2.0]);
-        let lucky = candidate(Parametrisation::Psm { shift: 0.0 }, &[9.0, 0.1, 9.0, 0.1, 0.1]);
-        let chosen = |c: Vec<Candidate>| choose(c).map(|c| c.parametrisation);
-        assert_eq!(chosen(vec![uniform(), lucky.clone()]), Some(Parametrisation::Uniform));
-        assert_eq!(chosen(vec![uniform(), lucky, better]), Some(Parametrisation::Lispsm));
-        // A gain too small to rely on; one that is the same as the one before.
-        let little = candidate(Parametrisation::Lispsm, &[3.9, 3.9, 4.9, 2.9, 3.9]);
-        assert_eq!(chosen(vec![uniform(), little]), Some(Parametrisation::Uniform));
-        let lispsm = candidate(Parametrisation::Lispsm, &[2.0; 5]);
-        let same = candidate(Parametrisation::Psm { shift: 0.0 }, &[1.9999; 5]);
-        assert_eq!(chosen(vec![uniform(), lispsm, same]), Some(Parametrisation::Lispsm));
-        assert_eq!(chosen(vec![uniform()]), Some(Parametrisation::Uniform));
-        assert_eq!(chosen(Vec::new()), None);
+    fn the_even_map_is_kept_unless_another_can_be_relied_on_to_be_better() {
+        let even = [4.0, 4.0, 5.0, 3.0, 4.0];
+        assert!(is_better(&even, &[2.0, 2.1, 2.5, 1.5, 2.0]));
+        // A gain too small to rely on; what chance could have done; worse.
+        assert!(!is_better(&even, &[3.9, 3.9, 4.9, 2.9, 3.9]));
+        assert!(!is_better(&even, &[9.0, 0.1, 9.0, 0.1, 0.1]));
+        assert!(!is_better(&even, &[9.0; 5]));
+        // Nothing to go by.
+        assert!(!is_better(&even, &[f64::NAN; 5]));
+        assert!(!is_better(&[], &[]));
     }
 }

@@ -8,7 +8,7 @@ use scene_core::{Camera, GBuffer, Light, Report, Scene};
 
 use crate::aliasing::{self, Aliasing};
 use crate::caster_image::{CasterImage, Within};
-use crate::choice::{Parametrisation, Situation, choose};
+use crate::choice::{Parametrisation, Situation};
 use crate::light_image::{FACES, LightImage, face_of, face_volume};
 use crate::seen::{Sample, Seen, Wanted};
 use crate::view_frame::ViewFrame;
@@ -177,12 +177,11 @@ fn map_view(
         near_shadows: &near_shadows,
         map_size: params.map_size,
     };
-    let chosen = choose(situation.candidates(params.variant))?;
+    let (mut parametrisation, mut warp) = situation.chosen(params.variant);
     let fit = |warp: &Warp| {
         let within = Within { image: &image.warp, part: &part };
         seen.fit(warp, within, |point| images.image_of(point) == index)
     };
-    let (mut parametrisation, mut warp) = (chosen.parametrisation, chosen.warp);
     let (mut window, mut w) = fit(&warp);
     let is_before = w[0] > 0.0;
     if !is_before {

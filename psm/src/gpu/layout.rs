@@ -171,12 +171,15 @@ impl ViewOnGpu {
 }
 
 /// Bytes of a `Tile` of `frame.wesl`.
-pub const TILE_BYTES: u64 = 12;
+pub const TILE_BYTES: u64 = 16;
 
 /// Bytes of a `Choice` of `frame.wesl`.
-pub const CHOICE_BYTES: u64 = 112;
+pub const CHOICE_BYTES: u64 = 128;
 
-/// Bytes of a tile's fit: three vectors.
+/// Workgroups that share the tiles of an image whose pixels are asked: `FITTERS` of `seen.wesl`.
+pub const FITTERS: u32 = 64;
+
+/// Bytes of a tile's fit: three vectors. Before, of its sample.
 pub const FIT_BYTES: u64 = 48;
 
 /// Bytes from one projection to the next: what every device takes for the offset of a uniform.

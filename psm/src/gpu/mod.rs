@@ -7,8 +7,8 @@
 //! | stage | pass | what it writes |
 //! | --- | --- | --- |
 //! | `prepare.receivers` | `see`, a workgroup a tile | nearest, farthest and a typical receiver of each tile |
-//! | `prepare.views` | `choose`, a workgroup an image of the light | the parametrisation |
-//! | | `fit`, a workgroup a tile | its window around the tile's receivers, where that may reach beyond the others' |
+//! | `prepare.views` | `choose`, a workgroup an image of the light | the parametrisation, and a list of the tiles that may reach beyond its window |
+//! | | `fit`, workgroups that share the list | a window around each one's receivers |
 //! | | `write_views`, a workgroup an image | the projection, in a buffer that the depth pass draws by |
 //! | `prepare.maps` | the depth pass | the nearest triangle a texel |
 //! | `shade.lookup` | full screen | V |
@@ -38,7 +38,8 @@ use crate::view_frame::ViewFrame;
 use crate::views::Images;
 use crate::{PsmParams, lookup};
 use layout::{
-    BoxOnGpu, CHOICE_BYTES, FIT_BYTES, FrameUniform, ImageUniform, PROJECTION_STRIDE, TILE_BYTES, ViewOnGpu,
+    BoxOnGpu, CHOICE_BYTES, FIT_BYTES, FITTERS, FrameUniform, ImageUniform, PROJECTION_STRIDE, TILE_BYTES,
+    ViewOnGpu,
 };
 
 /// The technique on one device: pipelines, and the light prepared last.
@@ -251,7 +252,7 @@ impl PsmOnGpu {
         let Passes { see, choose, fit, write_views } = &self.passes;
         see.record(recorder, "prepare.receivers", &groups, of_tiles);
         choose.record(recorder, "prepare.views", &groups, of_images);
-        fit.record(recorder, "prepare.views", &groups, of_tiles);
+        fit.record(recorder, "prepare.views", &groups, [FITTERS, 1, count as u32]);
         write_views.record(recorder, "prepare.views", &groups, of_images);
 
         let nowhere = std::iter::repeat_n(glam::Mat4::ZERO, count as usize);
