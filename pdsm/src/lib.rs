@@ -245,17 +245,22 @@ impl PreparedPdsm<'_> {
         !self.windows.iter().any(|window| window.layout.is_of_part())
     }
 
-    /// Leaves out windows of parts, the farthest first, until the nodes of all take no more than `most` bytes; how many
-    /// that were.
+    /// Leaves out windows of parts, the farthest first, until a device `holds` the bytes of index and nodes of all that are left;
+    /// how many that were.
     #[cfg(feature = "gpu")]
-    fn leave_out_parts(&mut self, most: u64) -> u64 {
-        let bytes = |window: &Window| size_of_val(window.functions.nodes().words()) as u64;
-        let mut all: u64 = self.windows.iter().map(bytes).sum();
+    fn leave_out_parts(&mut self, holds: impl Fn([u64; 2]) -> bool) -> u64 {
+        let bytes = |window: &Window| {
+            let functions = &window.functions;
+            [functions.index(), functions.nodes().words()].map(|words| size_of_val(words) as u64)
+        };
+        let of_all = self.windows.iter().chain(self.moving.iter()).map(bytes);
+        let [mut index, mut nodes] = of_all.fold([0; 2], |sum, own| [sum[0] + own[0], sum[1] + own[1]]);
         let parts = self.windows.partition_point(|window| window.layout.is_of_part());
         let mut kept = parts;
-        while all > most && kept > 0 {
+        while !holds([index, nodes]) && kept > 0 {
             kept -= 1;
-            all -= bytes(&self.windows[kept]);
+            let own = bytes(&self.windows[kept]);
+            (index, nodes) = (index - own[0], nodes - own[1]);
         }
         if kept < parts {
             self.windows = [&self.windows[..kept], &self.windows[parts..]].concat().into();

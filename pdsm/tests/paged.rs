@@ -2,6 +2,7 @@
 
 #![cfg(feature = "gpu")]
 
+use gnomon_pdsm::functions::Functions;
 use gnomon_pdsm::gpu::PdsmOnGpu;
 use gnomon_pdsm::{Pdsm, PdsmParams, Precision};
 use scene_core::gpu::headless::VISIBILITY_FORMAT;
@@ -91,6 +92,29 @@ fn pages_hold_baked_functions() {
         });
         assert!(bits(&whole.visibility) == bits(&paged.visibility), "{light:?}");
     }
+}
+
+/// Pages hold nodes and the index: where they hold the nodes of all but no more, parts of what the camera sees are left out.
+#[test]
+fn parts_that_pages_do_not_hold_are_left_out() {
+    let Some(gpu) = testing::gpu() else { return };
+    let seen = setup("street");
+    let [_, light] = lights(&seen.0);
+    let params = PdsmParams { cascades: 3, ..params() };
+    let (pdsm, _) = Pdsm::new(params).prepare_for(&seen.0.scene, &light, Some(&seen.0.camera));
+    let bytes = |words: fn(&Functions) -> &[u32]| -> u64 {
+        pdsm.windows().iter().map(|window| size_of_val(words(&window.functions)) as u64).sum()
+    };
+    let (nodes, index) = (bytes(|functions| functions.nodes().words()), bytes(Functions::index));
+    let layers = nodes.div_ceil(1 << 20);
+    assert!(nodes > LIMIT && nodes + index > layers << 20);
+    let Some(small) = small(layers as u32) else { return };
+    let left_out = |gpu: &Gpu| {
+        let mut pdsm = PdsmOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT);
+        run(gpu, &seen, &light, &mut pdsm).unwrap().report.skipped["windows beyond the device's memory"]
+    };
+    assert_eq!(left_out(&gpu), 0);
+    assert!(left_out(&small) > 0);
 }
 
 #[test]

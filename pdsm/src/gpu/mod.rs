@@ -32,6 +32,7 @@ pub struct PdsmOnGpu {
     from_buffers: Reader,
     /// Made when functions are first more than the device binds in one piece.
     from_pages: Option<Reader>,
+    pages: Pages,
     prepared: Option<Prepared>,
 }
 
@@ -84,6 +85,7 @@ impl PdsmOnGpu {
             format: visibility,
             from_buffers,
             from_pages: None,
+            pages: Pages::of(device),
             prepared: None,
         }
     }
@@ -113,8 +115,9 @@ impl PdsmOnGpu {
             }
             Source::Baked(baked) => baked.prepare(geometry, query.light).map_err(baked::refused)?,
         };
-        let most = binding_limit(recorder.device).max(Pages::of(recorder.device).most_bytes());
-        report.skip("windows beyond the device's memory", pdsm.leave_out_parts(most));
+        let [bound, paged] = [binding_limit(recorder.device), self.pages.most_bytes()];
+        let holds = |[index, nodes]: [u64; 2]| index.max(nodes) <= bound || index + nodes <= paged;
+        report.skip("windows beyond the device's memory", pdsm.leave_out_parts(holds));
         report.time("prepare.upload", |_| self.upload(recorder, query, &pdsm))?;
         Ok(report)
     }
@@ -140,7 +143,7 @@ impl PdsmOnGpu {
         let is_paged = bytes(&index).max(bytes(&nodes)) > binding_limit(device);
         let (functions, held, first_word): (Vec<Bound>, _, _) = if is_paged {
             let all = [&*index, &*nodes].concat();
-            let (pages, held) = Pages::of(device).texture(device, queue, "functions", &all)?;
+            let (pages, held) = self.pages.texture(device, queue, "functions", &all)?;
             (vec![(&pages).into()], held, (bytes(&index) / 4) as u32)
         } else {
             let buffer = |what, pieces: &[&[u32]]| {
@@ -156,7 +159,7 @@ impl PdsmOnGpu {
             still: pdsm.windows.len() as u32,
             tolerance: pdsm.tolerance,
             radius: pdsm.radius(),
-            page_bits: Pages::of(device).bits,
+            page_bits: self.pages.bits,
             ..bytemuck::Zeroable::zeroed()
         };
         // Far below u32's end, as what the device holds is.
