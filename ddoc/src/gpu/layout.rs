@@ -1,7 +1,9 @@
 //! What the shaders read: the uniform, and tables of edges and lists. A test holds every offset against the linked WGSL.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
+use scene_core::gpu::binding;
+use scene_core::light::{LightHull, LightPoint};
 
 use crate::PreparedDdoc;
 use crate::grid::TileLists;
@@ -63,10 +65,14 @@ pub struct DdocUniform {
     pub first_outline: u32,
     /// Where the vectors of outlines begin.
     pub outlines: u32,
-    /// Zero.
-    pub padding: [u32; 2],
+    /// Words that lie in the first of the two tables.
+    pub split: u32,
+    /// Receivers that a workgroup of `shade.rest` answers.
+    pub alone: u32,
     /// Views and their tables.
     pub views: [ViewTable; MOST_VIEWS],
+    /// Corners of the light's hull: places, or directions with w = 0; w = −1 where there are no more.
+    pub hull: [Vec4; 8],
     /// a of the points.
     pub xs: [f32; 1024],
     /// b of the points.
@@ -85,6 +91,10 @@ pub struct Tables {
 }
 
 impl Tables {
+    /// How group 0 binds the uniform, views, both parts of the words, and the edges.
+    pub const BINDINGS: [wgpu::BindingType; 5] =
+        [binding::UNIFORM, binding::STORAGE, binding::STORAGE, binding::STORAGE, binding::STORAGE];
+
     /// Of what the CPU has prepared; `splats` are those of each view.
     pub fn new(prepared: &PreparedDdoc<'_>, splats: &[TileLists]) -> Self {
         let mut uniform = DdocUniform {
@@ -98,8 +108,15 @@ impl Tables {
             },
             first_outline: prepared.first_outline as u32,
             outlines: 4 * prepared.edges.len() as u32,
+            hull: [Vec4::NEG_W; 8],
             ..Zeroable::zeroed()
         };
+        for (into, corner) in uniform.hull.iter_mut().zip(prepared.hull.iter().flat_map(LightHull::corners)) {
+            *into = match *corner {
+                LightPoint::At(place) => (place - prepared.origin).extend(1.0),
+                LightPoint::Towards(way) => way.extend(0.0),
+            };
+        }
         uniform.taps = prepared.points.len().min(uniform.xs.len()) as u32;
         for (index, &Vec2 { x, y }) in prepared.points.iter().enumerate().take(uniform.taps as usize) {
             (uniform.xs[index], uniform.ys[index]) = (x, y);
@@ -133,6 +150,14 @@ impl Tables {
             }
         }
         Self { uniform, words, edges }
+    }
+
+    /// Both parts of the words if a binding takes so many bytes; what lies beyond the second is left to an error.
+    pub fn parts(&mut self, most: u64) -> [&[u32]; 2] {
+        let split = self.words.len().min(usize::try_from(most / 4).unwrap_or(usize::MAX));
+        self.uniform.split = split as u32;
+        let (first, other) = self.words.split_at(split);
+        [first, other]
     }
 }
 
@@ -209,8 +234,33 @@ mod tests {
             DdocUniform,
             SHADE,
             "Ddoc",
-            [origin, taps, tolerance, count, kind, single, first_outline, outlines, padding, views, xs, ys]
+            [
+                origin,
+                taps,
+                tolerance,
+                count,
+                kind,
+                single,
+                first_outline,
+                outlines,
+                split,
+                alone,
+                views,
+                hull,
+                xs,
+                ys
+            ]
         );
+    }
+
+    #[test]
+    fn words_lie_in_two_parts() {
+        let words = vec![5, 6, 7];
+        let mut tables = Tables { uniform: Zeroable::zeroed(), words, edges: Vec::new() };
+        assert_eq!(tables.parts(8), [&[5, 6][..], &[7]]);
+        assert_eq!(tables.uniform.split, 2);
+        assert_eq!(tables.parts(u64::MAX), [&[5, 6, 7][..], &[]]);
+        assert_eq!(tables.uniform.split, 3);
     }
 
     #[test]

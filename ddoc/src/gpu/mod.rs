@@ -1,11 +1,19 @@
-//! The GPU path: the map and the edges of the CPU path's own code, uploaded, and one full-screen pass that looks them up.
+//! The GPU path: the map and the edges of the CPU path's own code, uploaded, and passes that look them up.
 //!
 //! | stage | what is done |
 //! | --- | --- |
 //! | `prepare.map`, `prepare.silhouettes` | the CPU's own code |
 //! | `prepare.splat` | the CPU's own code, over all surfaces of the scene that receive shadows |
 //! | `prepare.upload` | lists and edges are copied |
-//! | `shade.penumbra` | V of every pixel, those without a splat too |
+//! | `shade.penumbra` | V of every pixel, which goes through the lists over it |
+//!
+//! Where a list is too long for one thread's loop, three passes take the place of that one (module `groups`):
+//!
+//! | stage | what is done |
+//! | --- | --- |
+//! | `shade.penumbra` | V of every pixel, a workgroup for 8 × 8 of them: those in one tile of the light's image go through its lists together, each thread looks at other entries, and pixels ask what reaches into their beam |
+//! | `shade.rest` | V of pixels that would take too many rounds so, one after the other, each by all threads of its workgroup |
+//! | `shade.write` | V is copied to the texture |
 //!
 //! Where the CPU splats over what is seen, splats here reach whatever the scene holds: they are made once a light and hold
 //! for any camera, so that a frame costs the CPU one recorded pass. Neither changes the image.
@@ -13,34 +21,37 @@
 //! V differs from the CPU's by rounding alone: the G-buffer's positions are found again from their depths, and a point of
 //! the light may fall to the other side of an edge, each a step of 1/`taps`.
 
+mod groups;
 pub mod layout;
 pub mod shaders;
 
 use gnomon_shadow_map::gpu::layout::ViewUniform;
 use scene_core::gpu::{
-    GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings,
-    SceneGroups, VisibilityPass, VisibilityPassParts, binding, storage_buffer,
+    Bound, GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings,
+    SceneGroups, VisibilityPass, VisibilityPassParts, binding_limit, storage_buffer,
 };
 use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Origin, Report};
 
 use crate::params::Variant;
 use crate::{Ddoc, DdocParams, cpu};
+use groups::{Frame, Groups, answered_at_once};
 use layout::{MOST_VIEWS, Tables};
 
-/// Turns of loops that a pixel may take: Mesa's software drivers end all loops of a pixel after 65,535 turns in sum, and a wrong
-/// image is worse than none. What takes turns beside edges and faces is far less than the rest.
+/// Rounds of loops that a thread may take, `MOST_TURNS` of `groups.wesl`: Mesa's software driver ends all loops of eight threads
+/// together after 65,535 rounds in sum, and a wrong image is worse than none. What takes rounds beside edges and faces is far less
+/// than the rest.
 const MOST_TURNS: u32 = 60_000;
 
-/// Edges that the shader looks at, edges that it counts and faces that it asks in a turn; edges in a turn of the variants that
-/// keep one.
-const LOOKED_AT_ONCE: u32 = 16;
-const COUNTED_AT_ONCE: u32 = 8;
-const OUTER_AT_ONCE: u32 = 8;
-const FACES_AT_ONCE: u32 = 4;
-
-/// Points of the light that the shader counts at once, `VECTORS` of four.
+/// Edges that `shade.wesl` looks at in a round; points of the light that are counted at once.
+const LOOKED_AT_ONCE: u32 = 2;
 const POINTS_AT_ONCE: u32 = 64;
+
+/// Pixels whose loops that driver counts together.
+const TOGETHER: u32 = 8;
+
+/// Things that lists can name.
+const MOST_LISTED: u32 = 1 << 27;
 
 /// The technique on one device: pipelines, and the edges of the light prepared last.
 #[derive(Debug)]
@@ -52,15 +63,36 @@ pub struct DdocOnGpu {
     scene: SceneBindings,
     receivers: Receivers,
     pass: VisibilityPass,
+    visibility: wgpu::TextureFormat,
+    /// Made for the first light whose lists are long.
+    groups: Option<Groups>,
+    always_groups: bool,
     prepared: Option<Prepared>,
 }
 
 /// What `prepare` leaves to `shade`.
 #[derive(Debug)]
 struct Prepared {
-    own: wgpu::BindGroup,
+    /// What group 0 binds; passes of groups V, too.
+    bound: Vec<Bound>,
     scene: SceneGroups,
     bytes: u64,
+    /// Where lists are long, receivers that a workgroup of `shade.rest` answers.
+    at_once: Option<u32>,
+}
+
+/// Whether the longest lists, of edges and faces over one tile of each view, are too long for `shade.wesl`.
+fn are_long(longest: &[[u32; 2]], variant: Variant, points: usize) -> bool {
+    let rounds = (points as u32).div_ceil(POINTS_AT_ONCE);
+    longest.iter().any(|&[edges, faces]| {
+        // At worst every edge that is looked at is counted.
+        let turns = match variant {
+            Variant::Smoothies | Variant::PenumbraMap => edges,
+            _ => (edges / LOOKED_AT_ONCE + edges).saturating_mul(rounds),
+        };
+        // Rounds add up over eight pixels that diverge: all that is known of one is that some pixel goes on in it.
+        turns.saturating_add(faces).saturating_mul(TOGETHER) > MOST_TURNS
+    })
 }
 
 impl DdocOnGpu {
@@ -80,10 +112,8 @@ impl DdocOnGpu {
                 why: "this variant has a CPU path only".to_owned(),
             });
         }
-        let stages = wgpu::ShaderStages::FRAGMENT;
-        let types = [binding::UNIFORM, binding::STORAGE, binding::STORAGE, binding::STORAGE];
-        let own = HeldGroup::new(device, "ddoc", stages, &types);
-        let scene = SceneBindings::new(device, stages);
+        let own = HeldGroup::new(device, "ddoc", wgpu::ShaderStages::FRAGMENT, &Tables::BINDINGS);
+        let scene = SceneBindings::new(device, wgpu::ShaderStages::FRAGMENT | wgpu::ShaderStages::COMPUTE);
         let receivers = Receivers::new(device);
         let pass = VisibilityPass::new(
             device,
@@ -105,8 +135,16 @@ impl DdocOnGpu {
             scene,
             receivers,
             pass,
+            visibility,
+            groups: None,
+            always_groups: false,
             prepared: None,
         })
+    }
+
+    /// From the next light on receivers go through lists in groups, however short those are. The image is the same.
+    pub fn always_in_groups(&mut self) {
+        self.always_groups = true;
     }
 
     /// Finds the edges of the query's light on the CPU and copies them to the device. They hold for any camera.
@@ -139,33 +177,38 @@ impl DdocOnGpu {
             }
             splats
         });
-        let rounds = (prepared.points.len() as u32).div_ceil(POINTS_AT_ONCE);
-        for (splats, faces) in splats.iter().zip(&prepared.faces) {
-            // At worst every edge that is looked at is counted. Counting is taken for twice its turns: where a trial came nearer to
-            // the limit pixels were wrong, and why is not known.
-            let edges = splats.longest();
-            let turns = match prepared.variant {
-                Variant::Smoothies | Variant::PenumbraMap => edges / OUTER_AT_ONCE,
-                _ => (edges / LOOKED_AT_ONCE + 2 * (edges / COUNTED_AT_ONCE)).saturating_mul(rounds),
-            };
-            let turns = turns.saturating_add(faces.lists().longest() / FACES_AT_ONCE);
-            GpuError::within("turns for edges and faces over one tile", turns, MOST_TURNS)?;
+        GpuError::within("triangles", geometry.triangles().len() as u32, MOST_LISTED)?;
+        GpuError::within("edges", prepared.edges.len() as u32, MOST_LISTED)?;
+        let longest: Vec<_> = splats
+            .iter()
+            .zip(&prepared.faces)
+            .map(|(splats, faces)| [splats.longest(), faces.lists().longest()])
+            .collect();
+        let points = prepared.points.len();
+        let mut at_once = None;
+        if self.always_groups || are_long(&longest, prepared.variant, points) {
+            at_once = Some(answered_at_once(&longest, points)?);
+            let make = || Groups::new(device, &self.scene, &self.receivers, self.visibility);
+            self.groups.get_or_insert_with(make);
         }
-        let own = report.time("prepare.upload", |_| {
-            let tables = Tables::new(&prepared, &splats);
+        let (bound, bytes) = report.time("prepare.upload", |_| {
+            let mut tables = Tables::new(&prepared, &splats);
+            tables.uniform.alone = at_once.unwrap_or(0);
             let views: Vec<_> =
                 prepared.layers.iter().map(|layers| ViewUniform::new(&layers.image.view)).collect();
-            let lists = storage_buffer(device, "lists over tiles", bytemuck::cast_slice(&tables.words))?;
+            let [first, other] = tables.parts(binding_limit(device));
+            let first = storage_buffer(device, "lists over tiles", bytemuck::cast_slice(first))?;
+            let other = storage_buffer(device, "lists over tiles", bytemuck::cast_slice(other))?;
             let edges = storage_buffer(device, "edges", bytemuck::cast_slice(&tables.edges))?;
-            let bytes = lists.size() + edges.size();
+            let bytes = first.size() + other.size() + edges.size();
             let uniform = self.uniform.get(device, bytemuck::bytes_of(&tables.uniform));
             let views = self.views.get(device, bytemuck::cast_slice(&views));
-            let bound = [uniform.into(), views.into(), lists.into(), edges.into()];
-            Ok::<_, GpuError>((self.own.get(device, &bound), bytes))
+            let bound = [uniform, views, first, other, edges].map(Bound::Buffer);
+            Ok::<_, GpuError>((bound.to_vec(), bytes))
         })?;
-        let (own, bytes) = own;
         report.bytes = bytes;
-        self.prepared = Some(Prepared { own, scene: self.scene.groups(device, &query.scene), bytes });
+        let scene = self.scene.groups(device, &query.scene);
+        self.prepared = Some(Prepared { bound, scene, bytes, at_once });
         self.receivers.prepare(device, query);
         Ok(report)
     }
@@ -184,7 +227,16 @@ impl DdocOnGpu {
         let not_prepared = || TechniqueError::NotPrepared { technique: DdocParams::TECHNIQUE };
         let prepared = self.prepared.as_ref().ok_or_else(not_prepared)?;
         let receivers = self.receivers.group(recorder.device, camera, gbuffer).ok_or_else(not_prepared)?;
-        self.pass.record(recorder, "shade.penumbra", &prepared.own, &prepared.scene, &receivers, visibility);
-        Ok(Report { bytes: prepared.bytes, ..Default::default() })
+        let Prepared { bound, scene, bytes, at_once } = prepared;
+        let mut report = Report { bytes: *bytes, ..Default::default() };
+        if let (Some(at_once), Some(groups)) = (*at_once, &mut self.groups) {
+            let size = [camera.width, camera.height];
+            let frame = Frame { bound, scene, receivers: &receivers, size, at_once };
+            report.bytes += groups.record(recorder, &frame, visibility)?;
+        } else {
+            let own = self.own.get(recorder.device, bound);
+            self.pass.record(recorder, "shade.penumbra", &own, scene, &receivers, visibility);
+        }
+        Ok(report)
     }
 }
