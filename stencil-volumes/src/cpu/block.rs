@@ -324,7 +324,6 @@ impl Block {
         let mut groups = Vec::new();
         for group in 0..volumes.runs.len().div_ceil(LANES) {
             let mut within = volumes.runs.within(simd, group, &shaft);
-            self.work.run_pairs += u64::from(within.count_ones());
             while within != 0 {
                 let run = group * LANES + within.trailing_zeros() as usize;
                 within &= within - 1;
@@ -332,7 +331,8 @@ impl Block {
                 groups.push(edges.start / LANES..edges.end.div_ceil(LANES));
             }
         }
-        self.work.runs_skipped += volumes.runs.len() as u64 - self.work.run_pairs;
+        self.work.run_pairs += groups.len() as u64;
+        self.work.runs_skipped += (volumes.runs.len() - groups.len()) as u64;
         for group in groups.into_iter().flatten() {
             let side = &volumes.sides[group];
             let mut found = side.may_cross_box(simd, center, half);
