@@ -26,8 +26,15 @@ const LISTS: u64 = 64 << 20;
 /// Words of `counters`.
 const COUNTERS: u64 = 276;
 
-/// The first word that `shade` counts in: `UNLIT_PIXELS` of `volumes.wesl`.
-const SHADE_COUNTS: u64 = 264;
+/// Words of `counters` in which `volumes.wesl` counts for reports: from here on faces that are outside of the region, in another's
+/// shadow, and turned to the light; then what `shade` counts, pairs of sides in two words each.
+const FACES: usize = 256;
+const UNLIT_PIXELS: usize = 264;
+const UNIFORM_TILES: usize = 266;
+const RUNS_SKIPPED: usize = 267;
+const RUNS_ASKED: usize = 268;
+const TILE_PAIRS: usize = 270;
+const PIXEL_PAIRS: usize = 272;
 
 /// Edges that are counted at most, also if `rays` is off: 64 invocations go through them together. Drivers end a dispatch that
 /// takes too long, and Mesa's software ones all loops of an invocation after 65,535 rounds in sum; here are 2¹⁴ over edges and
@@ -321,7 +328,7 @@ impl VolumesOnGpu {
         let pixels: Bound = self.pixels.get(device, 4 * (4 + 2 * count))?.into();
         let lists: Bound = self.lists.get(device, 4 * blocks * (u64::from(uniform.capacity) + 2))?.into();
         let counters = self.counters.get(device, 4 * COUNTERS)?;
-        recorder.encoder.clear_buffer(&counters, 4 * SHADE_COUNTS, None);
+        recorder.encoder.clear_buffer(&counters, 4 * UNLIT_PIXELS as u64, None);
         let counters: Bound = counters.into();
         let edges: Bound = self.edges.get(device, 16 * u64::from(tables.edges))?.into();
         let nodes: Bound = tables.nodes.clone().into();
@@ -373,15 +380,16 @@ impl VolumesOnGpu {
         let words: Vec<u32> = gpu.read_buffer(&self.counters(&gpu.device)?)?;
         let pixels: Vec<u32> = gpu.read_buffer(&self.pixels(&gpu.device)?)?;
         let word = |index: usize| u64::from(words[index]);
-        report.skip("caster triangles outside view", word(256));
-        report.skip("caster triangles in another's shadow", word(257));
-        report.skip("caps", word(258));
-        report.skip("pixels the light cannot reach", word(264));
-        report.skip("tiles of one count", word(266));
-        report.skip("runs of edges beside a block", word(267));
-        report.count("pairs of run and block", word(268));
-        report.count("pairs of side and tile", word(270) | word(271) << 32);
-        report.count("pairs of side and pixel", word(272) | word(273) << 32);
+        let wide = |index: usize| word(index) | word(index + 1) << 32;
+        report.skip("caster triangles outside view", word(FACES));
+        report.skip("caster triangles in another's shadow", word(FACES + 1));
+        report.skip("caps", word(FACES + 2));
+        report.skip("pixels the light cannot reach", word(UNLIT_PIXELS));
+        report.skip("tiles of one count", word(UNIFORM_TILES));
+        report.skip("runs of edges beside a block", word(RUNS_SKIPPED));
+        report.count("pairs of run and block", word(RUNS_ASKED));
+        report.count("pairs of side and tile", wide(TILE_PAIRS));
+        report.count("pairs of side and pixel", wide(PIXEL_PAIRS));
         report.count("pixels traced", pixels.first().map_or(0, |&count| u64::from(count)));
         Ok(report)
     }
