@@ -68,10 +68,13 @@ impl Situation<'_> {
 
     /// The variant `auto`: the map that promises the least error, if that can be relied on to be less than the even map's.
     fn fitted(&self) -> Option<(Parametrisation, Warp)> {
-        let window = self.window(&self.image.warp);
+        let even = self.window(&self.image.warp);
         let receivers: Vec<_> = self.spread().collect();
-        let least = fitted::least(&self.image.warp, &window, &receivers, self.near_shadows)?;
-        is_better(&self.errors(&self.image.warp), &self.errors(&least))
+        let least = fitted::least(&self.image.warp, &even, &receivers, self.near_shadows)?;
+        let errors = |warp: &Warp, window: &Window| {
+            aliasing::expected_errors(warp, window, self.map_size, self.near_shadows)
+        };
+        is_better(&errors(&self.image.warp, &even), &errors(&least, &self.window(&least)))
             .then_some((Parametrisation::Fitted, least))
     }
 
@@ -83,11 +86,6 @@ impl Situation<'_> {
     /// Their window.
     fn window(&self, warp: &Warp) -> Window {
         self.spread().fold(Window::EMPTY, |window, point| window.with(warp.place(point))).widened()
-    }
-
-    /// What is expected of a warp at the samples near shadows, in the window that these receivers would give it.
-    fn errors(&self, warp: &Warp) -> Vec<f64> {
-        aliasing::expected_errors(warp, &self.window(warp), self.map_size, self.near_shadows)
     }
 }
 
