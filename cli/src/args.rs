@@ -330,6 +330,7 @@ Examples:
   gnomon stress --quick
   gnomon stress --variants --backend cpu,gpu
   gnomon stress --techniques psm --json
+  gnomon stress --cells 'ten million' --backend gpu
 
 Scenes are scaled (1e-3 to 1e4), moved (to 1e4 of their size) and cut into other triangles, none of which may change the \
 image: their error may exceed that of the scene as it was by what moving shadows by half a pixel would add. Lights at \
@@ -345,6 +346,10 @@ pub(crate) struct StressArgs {
     /// One scene in place of four, and no large one
     #[arg(long)]
     pub(crate) quick: bool,
+    /// Only scenes with this in their name, as tables and failures write it, and those that they are held against; may be
+    /// given again
+    #[arg(long, value_name = "TEXT")]
+    pub(crate) cells: Vec<String>,
     /// Where techniques run; cpu,gpu tries both
     #[arg(long, value_enum, value_name = "BACKEND", value_delimiter = ',', default_value = "cpu")]
     pub(crate) backend: Vec<Backend>,

@@ -46,6 +46,8 @@ pub(crate) enum CliError {
     Camera(#[from] CameraError),
     #[error("there is no technique '{name}': there is {}", known.join(", "))]
     NoSuchTechnique { name: String, known: Vec<&'static str> },
+    #[error("--cells: no scene of this test has {} in its name", names.join(" or "))]
+    NoSuchCells { names: Vec<String> },
     #[error("there is nothing to compare: --techniques names none")]
     NoTechniques,
     #[error(transparent)]

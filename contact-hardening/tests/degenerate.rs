@@ -79,3 +79,13 @@ fn far_from_zero_shadows_stay_on_the_gpu() {
     let error = conformance::far_from_zero_on(&gpu, &ContactHardening::default());
     assert!(error.there < error.here + error.moved, "{error:?}");
 }
+
+/// Vertices are read from the second piece that they are bound in as from the first.
+#[cfg(feature = "gpu")]
+#[test]
+fn scenes_bound_in_two_pieces_look_the_same() {
+    for variant in Variant::ALL {
+        let params = ContactHardeningParams { variant, map_size: 256, ..Default::default() };
+        conformance::assert_same_in_two_pieces(&ContactHardening::new(params));
+    }
+}

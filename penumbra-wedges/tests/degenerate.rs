@@ -228,3 +228,13 @@ fn masked_casters_are_refused() {
         assert_eq!(refused, !is_taken, "{preset}");
     }
 }
+
+/// Vertices are read from the second piece that they are bound in as from the first.
+#[cfg(feature = "gpu")]
+#[test]
+fn scenes_bound_in_two_pieces_look_the_same() {
+    for variant in VARIANTS {
+        let params = WedgeParams { variant, ..Default::default() };
+        conformance::assert_same_in_two_pieces(&PenumbraWedges::new(params));
+    }
+}

@@ -10,11 +10,12 @@
 mod truth;
 
 use glam::Vec3;
-use gnomon_penumbra_wedges::{PenumbraWedgesOnGpu, Variant, WedgeParams};
+use gnomon_penumbra_wedges::{PenumbraWedges, PenumbraWedgesOnGpu, Variant, WedgeParams};
 use scene_core::gpu::headless::VISIBILITY_FORMAT;
 use scene_core::gpu::{Gpu, testing};
 use scene_core::reference::valid_pixels;
-use scene_core::{Camera, GBuffer, Light, Scene, VisibilityImage, raster, scenes};
+use scene_core::technique::{ShadowQuery, conformance};
+use scene_core::{Camera, GBuffer, Light, Scene, TriangleMesh, VisibilityImage, raster, scenes};
 use truth::shade_gbuffer;
 
 /// Half a step of an 8-bit image is 1/510; a whole one is what may differ.
@@ -210,4 +211,38 @@ fn a_planted_difference_is_found() {
     let (image, _) = on_gpu(&gpu, &case(-2.0), &gbuffer, params, 64 << 20);
     let found = differences(&case(2.0), &gbuffer, params, &image).1.len();
     assert!(found > 50, "{found}");
+}
+
+/// A device that binds so little that edges are gone through in pieces and the tree has larger leaves; and one that has no room for all
+/// edges of the silhouette, where rays to the same samples answer.
+#[test]
+fn tables_beyond_what_is_bound_change_nothing() {
+    let setup = scenes::build("knot", 0.0).unwrap();
+    let camera = setup.camera.with_size(64, 48);
+    let bounds = setup.scene.bounds();
+    let center = bounds.center() + Vec3::new(0.3, 0.9, 0.2) * bounds.diagonal();
+    let light = Light::Sphere { center, radius: 0.05 * bounds.diagonal() };
+    let query = ShadowQuery { scene: &setup.scene, light: &light, camera: &camera };
+    // Triangles, twelve bytes each, are just bound; an edge and a half a triangle take twice as much.
+    let bytes = 13 * setup.scene.triangles().len() as u64;
+    let technique = PenumbraWedges::new(WedgeParams::default());
+    let images = |query: &ShadowQuery<'_>, bytes| conformance::whole_and_in_pieces(&technique, query, bytes);
+    let Some([whole, in_pieces]) = images(&query, bytes) else { return };
+    assert!(whole.values.iter().zip(&in_pieces.values).all(|(a, b)| a.to_bits() == b.to_bits()));
+
+    // No edge has two faces: all are of the silhouette.
+    let corner = |i: usize, root: f64| ((i as f64 * root).fract() as f32 - 0.5) * 4.0;
+    let at = |i| Vec3::new(corner(i, 2f64.sqrt()), corner(i, 3f64.sqrt()), corner(i, 5f64.sqrt()));
+    let corners: Vec<Vec3> =
+        (0..400).flat_map(|i| [at(i), at(i) + at(i + 7) * 0.1, at(i) + at(i + 9) * 0.1]).collect();
+    let triangles = (0..400).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let mut scene = Scene::new();
+    scene
+        .add(&TriangleMesh::new("soup", corners, triangles), glam::Affine3A::IDENTITY, Default::default())
+        .unwrap();
+    let light = Light::Sphere { center: Vec3::Y * 6.0, radius: 0.5 };
+    let query = ShadowQuery { scene: &scene, light: &light, camera: &camera.with_size(32, 24) };
+    let Some([whole, in_pieces]) = images(&query, 24 << 10) else { return };
+    let differ = whole.values.iter().zip(&in_pieces.values).filter(|(a, b)| (**a - **b).abs() > STEP);
+    assert_eq!(differ.count(), 0);
 }

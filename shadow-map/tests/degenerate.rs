@@ -57,3 +57,13 @@ fn skipping_never_changes_the_image() {
     }
     assert_eq!(images[0], images[1]);
 }
+
+/// Vertices are read from the second piece that they are bound in as from the first.
+#[cfg(feature = "gpu")]
+#[test]
+fn scenes_bound_in_two_pieces_look_the_same() {
+    for variant in Variant::ALL {
+        let params = ShadowMapParams { variant, map_size: 128, views: 4, ..Default::default() };
+        conformance::assert_same_in_two_pieces(&ShadowMap::new(params));
+    }
+}

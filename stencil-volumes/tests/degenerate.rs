@@ -75,3 +75,12 @@ fn masks_are_asked_by_rays() {
         }
     }
 }
+
+/// Vertices are read from the second piece that they are bound in as from the first.
+#[cfg(feature = "gpu")]
+#[test]
+fn scenes_bound_in_two_pieces_look_the_same() {
+    for variant in VARIANTS {
+        conformance::assert_same_in_two_pieces(&of(variant));
+    }
+}

@@ -18,6 +18,7 @@ use scene_core::geometry::{ObjectFlags, facing};
 use scene_core::gpu::headless::VISIBILITY_FORMAT;
 use scene_core::gpu::{Gpu, testing};
 use scene_core::reference::valid_pixels;
+use scene_core::technique::{ShadowQuery, conformance};
 use scene_core::{Camera, GBuffer, Light, Scene, TriangleMesh, VisibilityImage, raster, scenes};
 use truth::{Comparison, as_textures_hold_it, compare, trace};
 
@@ -272,5 +273,23 @@ fn skipping_changes_no_pixel() {
             let most = pairs(0) + 64 * counted(0, "pixels traced");
             assert!((1..Skips::EACH.len()).all(|kind| pairs(kind) <= most), "{name}, {light:?}: {most}");
         }
+    }
+}
+
+/// A device that binds so little that edges are gone through in pieces and the tree has larger leaves.
+#[test]
+fn tables_beyond_what_is_bound_change_nothing() {
+    let setup = scenes::build("knot", 0.0).unwrap();
+    let camera = setup.camera.with_size(96, 72);
+    let query = ShadowQuery { scene: &setup.scene, light: &setup.lights[0], camera: &camera };
+    // Triangles, twelve bytes each, are just bound; an edge and a half a triangle take as much by their ends alone.
+    let bytes = 15 * setup.scene.triangles().len() as u64;
+    for rays in [true, false] {
+        let technique = StencilVolumes::new(VolumeParams { rays, ..Default::default() });
+        let Some([whole, in_pieces]) = conformance::whole_and_in_pieces(&technique, &query, bytes) else {
+            return;
+        };
+        let same = whole.values.iter().zip(&in_pieces.values).all(|(a, b)| a.to_bits() == b.to_bits());
+        assert!(same, "rays {rays}");
     }
 }

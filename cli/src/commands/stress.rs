@@ -37,12 +37,12 @@ struct StressReport {
 pub(crate) fn run(args: &StressArgs, console: &Console) -> Result<(), CliError> {
     let chosen = techniques::chosen(&args.techniques, args.variants, args.seed)?;
     let gpu = backend::open(&args.backend)?;
-    let trials = trial::all(args.quick)?;
+    let trials = trial::chosen(args.quick, &args.cells)?;
     let truth_args = TruthArgs { samples: args.samples, exact: false, max_error: None };
     let mut cells: Vec<Cell> = Vec::new();
     // Errors on scenes as they are, by trial and technique: what changed scenes are held against.
     let mut base_rmse: BTreeMap<(String, String, &str), f64> = BTreeMap::new();
-    for (what, said) in trial::refusals() {
+    for (what, said) in trial::refusals(&args.cells) {
         let verdict = match said {
             Some(why) => Verdict::Refused { why },
             None => Verdict::Fail { why: "a scene took it".to_owned() },

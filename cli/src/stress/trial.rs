@@ -20,8 +20,28 @@ pub(crate) struct Trial {
 /// Size of the pictures.
 const SIZE: (u32, u32) = (96, 72);
 
+/// Those with one of `names` in theirs, all if there are none, and the trials that they are held against.
+///
+/// # Errors
+/// [`CliError::NoSuchCells`] if no trial and none of [`refusals`] has such a name.
+pub(crate) fn chosen(quick: bool, names: &[String]) -> Result<Vec<Trial>, CliError> {
+    let mut trials = all(quick)?;
+    let wanted: Vec<_> = trials.iter().filter(|trial| is_named(&trial.name, names)).collect();
+    if wanted.is_empty() && refusals(names).is_empty() {
+        return Err(CliError::NoSuchCells { names: names.to_vec() });
+    }
+    let bases: Vec<_> = wanted.iter().filter_map(|trial| trial.same_as.clone()).collect();
+    trials.retain(|trial| is_named(&trial.name, names) || bases.contains(&trial.name));
+    Ok(trials)
+}
+
+/// Whether a trial is asked for.
+fn is_named(trial: &str, names: &[String]) -> bool {
+    names.is_empty() || names.iter().any(|name| trial.contains(name.as_str()))
+}
+
 /// All of them; with `quick` those of one scene and no large ones.
-pub(crate) fn all(quick: bool) -> Result<Vec<Trial>, CliError> {
+fn all(quick: bool) -> Result<Vec<Trial>, CliError> {
     let bases: &[&str] = if quick { &["quads"] } else { &["quads", "ball", "chess", "street"] };
     let mut trials = Vec::new();
     for base in bases {
@@ -156,8 +176,9 @@ fn geometry(quick: bool, trials: &mut Vec<Trial>) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Meshes that no scene may take: what they are, and what the scene says to them; `None` if it took them.
-pub(crate) fn refusals() -> Vec<(&'static str, Option<String>)> {
+/// Meshes that no scene may take: what they are, and what the scene says to them; `None` if it took them. Those with one of `names`
+/// in theirs, all if there are none.
+pub(crate) fn refusals(names: &[String]) -> Vec<(&'static str, Option<String>)> {
     let corners = |third: Vec3| vec![Vec3::ZERO, Vec3::X, third];
     let say = |mesh: &TriangleMesh| {
         Scene::new()
@@ -166,11 +187,13 @@ pub(crate) fn refusals() -> Vec<(&'static str, Option<String>)> {
             .map(|error| error.to_string())
     };
     let mesh = |third, triangle| TriangleMesh::new("broken", corners(third), vec![triangle]);
-    vec![
+    let mut said = vec![
         ("a corner that is not a number", say(&mesh(Vec3::new(0.0, f32::NAN, 0.0), [0, 1, 2]))),
         ("a corner at infinity", say(&mesh(Vec3::new(0.0, f32::INFINITY, 0.0), [0, 1, 2]))),
         ("a corner that is not there", say(&mesh(Vec3::Y, [0, 1, 3]))),
-    ]
+    ];
+    said.retain(|(what, _)| is_named(what, names));
+    said
 }
 
 /// Corners of `count` triangles in the cube around the origin: they cut each other, and no edge is shared. Weyl's

@@ -217,7 +217,7 @@ impl ContactHardeningOnGpu {
                 is_parallel: matches!(query.light, Light::Directional { .. }),
             });
         }
-        self.receivers.prepare(device, query);
+        self.receivers.prepare(recorder, query);
         report.bytes = self.bytes();
         if let Some(source) = &mut self.source {
             let rest = source.technique.prepare(recorder, query)?;

@@ -209,7 +209,7 @@ impl DdocOnGpu {
         report.bytes = bytes;
         let scene = self.scene.groups(device, &query.scene);
         self.prepared = Some(Prepared { bound, scene, bytes, at_once });
-        self.receivers.prepare(device, query);
+        self.receivers.prepare(recorder, query);
         Ok(report)
     }
 

@@ -182,7 +182,7 @@ impl PdsmOnGpu {
         let own = reader.own.get(device, &bound);
         let (scene, survives_camera) = (self.scene.groups(device, &query.scene), pdsm.survives_camera());
         self.prepared = Some(Prepared { own, is_paged, scene, bytes, survives_camera });
-        self.receivers.prepare(device, query);
+        self.receivers.prepare(recorder, query);
         Ok(())
     }
 

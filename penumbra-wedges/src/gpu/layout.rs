@@ -35,8 +35,6 @@ pub struct WedgesUniform {
     pub size: [u32; 2],
     /// Triangles of the scene.
     pub triangles: u32,
-    /// Edges of the solid casters.
-    pub edges: u32,
     /// Edges that a block has room for.
     pub capacity: u32,
     /// Nodes of the tree of solid casters.
@@ -47,8 +45,6 @@ pub struct WedgesUniform {
     pub views: u32,
     /// Edges of a tile above which its pixels are traced.
     pub dense: u32,
-    /// Zero.
-    pub padding: [u32; 3],
     /// Two seeds a pattern.
     pub seeds: [[u32; 2]; PATTERNS],
 }
@@ -125,7 +121,6 @@ mod tests {
                 magnitude,
                 size,
                 triangles,
-                edges,
                 capacity,
                 solid_nodes,
                 nodes,

@@ -37,7 +37,7 @@ pub mod tables;
 
 use scene_core::gpu::{
     Bound, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings,
-    SceneGroups, WorkBuffer, binding, binding_limit,
+    SceneGroups, WorkBuffer, binding, binding_limit, pieces,
 };
 use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Report};
@@ -55,6 +55,9 @@ const LISTS: u64 = 64 << 20;
 
 /// Words of `counters`.
 const COUNTERS: u64 = 4;
+
+/// Bytes of an edge with its faces.
+const EDGE_BYTES: u64 = 16;
 
 /// Pixels a side of a block.
 const BLOCK: usize = 64;
@@ -145,7 +148,7 @@ impl PenumbraWedgesOnGpu {
         let settings = self.settings.get(device, bytemuck::bytes_of(&uniform));
         let facing: Bound = self.facing.get(device, 4 * u64::from(tables.triangles))?.into();
         let counters = self.counters.get(device, 4 * COUNTERS)?;
-        let candidates = self.candidates.get(device, candidate_bytes(&tables))?;
+        let candidates = self.candidates.get(device, candidate_bytes(&tables, device))?;
         let interpolated = self.params.variant == Variant::Interpolated;
         // Of its edges no face is asked from receivers; what meets at their ends is noted instead.
         let noted = if interpolated {
@@ -153,7 +156,7 @@ impl PenumbraWedgesOnGpu {
             recorder.encoder.clear_buffer(&corners, 0, None);
             corners
         } else {
-            self.variable.get(device, variable_bytes(&tables))?
+            self.variable.get(device, variable_bytes(&tables, device))?
         };
         recorder.encoder.clear_buffer(&counters, 0, None);
         let scene = self.scene.groups(device, &query.scene);
@@ -166,21 +169,24 @@ impl PenumbraWedgesOnGpu {
             let groups = [Some(&own), Some(&scene.triangles)];
             let triangles = workgroups(tables.triangles);
             self.passes.find_facing.pass.record(recorder, "prepare.facing", &groups, triangles);
-            let own = [
-                settings.clone(),
-                tables.edges.clone().into(),
-                tables.incident.clone().into(),
-                facing,
-                counters.clone().into(),
-                candidates.clone().into(),
-                noted.clone().into(),
-            ];
-            let own = self.passes.extract.group.get(device, &own);
-            let groups = [Some(&own), Some(&scene.triangles)];
-            let edges = workgroups(tables.edge_count);
-            self.passes.extract.pass.record(recorder, "prepare.silhouette", &groups, edges);
+            for (piece, range) in pieces(device, tables.edge_count, EDGE_BYTES).enumerate() {
+                let own = [
+                    settings.clone(),
+                    Bound::elements(&tables.edges, range.clone(), EDGE_BYTES),
+                    tables.incident.clone().into(),
+                    facing.clone(),
+                    counters.clone().into(),
+                    candidates.clone().into(),
+                    noted.clone().into(),
+                ];
+                let own = self.passes.extract.groups.get(device, piece, &own);
+                let groups = [Some(&own), Some(&scene.positions)];
+                let edges = workgroups(range.end - range.start);
+                self.passes.extract.pass.record(recorder, "prepare.silhouette", &groups, edges);
+            }
             if let Some(find_sides) = &mut self.passes.find_sides {
                 let sides = self.sides.get(device, side_bytes(&tables))?;
+                let edges = workgroups(tables.edge_count);
                 let own = [
                     settings,
                     tables.edges.clone().into(),
@@ -197,7 +203,7 @@ impl PenumbraWedgesOnGpu {
             let none: Bound = self.no_masks.get(device, &[]).into();
             self.no_cutouts.get(device, &[none.clone(), none])
         });
-        self.receivers.prepare(device, query);
+        self.receivers.prepare(recorder, query);
         self.tables = Some(tables);
         self.prepared = Some(Prepared { uniform, scene, cutouts });
         report.bytes = self.bytes();
@@ -215,7 +221,6 @@ impl PenumbraWedgesOnGpu {
             magnitude: if magnitude.is_finite() { magnitude } else { 0.0 },
             size: [camera.width, camera.height],
             triangles: tables.triangles,
-            edges: tables.edge_count,
             capacity: u64::from(tables.edge_count).min(room.saturating_sub(1)) as u32,
             solid_nodes: tables.solid_nodes,
             nodes: tables.all_nodes,
@@ -256,11 +261,11 @@ impl PenumbraWedgesOnGpu {
         let pixels: Bound = pixels.into();
         let lists: Bound = self.lists.get(device, 4 * blocks * (u64::from(uniform.capacity) + 1))?.into();
         let counters: Bound = self.counters.get(device, 4 * COUNTERS)?.into();
-        let candidates: Bound = self.candidates.get(device, candidate_bytes(tables))?.into();
+        let candidates: Bound = self.candidates.get(device, candidate_bytes(tables, device))?.into();
         let facing: Bound = self.facing.get(device, 4 * u64::from(tables.triangles))?.into();
         // What a variant keeps for an edge besides.
         let of_edges: Option<Bound> = match self.params.variant {
-            Variant::Exact => Some(self.variable.get(device, variable_bytes(tables))?.into()),
+            Variant::Exact => Some(self.variable.get(device, variable_bytes(tables, device))?.into()),
             Variant::Interpolated => Some(self.sides.get(device, side_bytes(tables))?.into()),
             Variant::Coverage => None,
         };
@@ -336,14 +341,14 @@ impl PenumbraWedgesOnGpu {
     }
 }
 
-/// Room for all edges; a binding must hold one.
-fn candidate_bytes(tables: &Tables) -> u64 {
-    32 * u64::from(tables.edge_count.max(1))
+/// Room for all edges, or for as many as the device binds: where more are found all pixels are traced. A binding must hold one.
+fn candidate_bytes(tables: &Tables, device: &wgpu::Device) -> u64 {
+    (32 * u64::from(tables.edge_count.max(1))).min(binding_limit(device) / 32 * 32)
 }
 
-/// Room for all faces of all edges, and their numbers.
-fn variable_bytes(tables: &Tables) -> u64 {
-    4 * (u64::from(tables.incident_count) + u64::from(tables.edge_count))
+/// Room for all faces of all edges, and their numbers, or for as many as the device binds, likewise.
+fn variable_bytes(tables: &Tables, device: &wgpu::Device) -> u64 {
+    (4 * (u64::from(tables.incident_count) + u64::from(tables.edge_count))).min(binding_limit(device) / 4 * 4)
 }
 
 /// Room for the side planes of all edges.

@@ -1,7 +1,8 @@
 //! The pipelines.
 
 use scene_core::gpu::{
-    ComputePass, HeldGroup, Receivers, SceneBindings, VisibilityPass, VisibilityPassParts, binding,
+    ComputePass, HeldGroup, HeldGroups, Receivers, SceneBindings, VisibilityPass, VisibilityPassParts,
+    binding,
 };
 
 use super::shaders;
@@ -14,11 +15,18 @@ pub(super) struct Pass {
     pub(super) group: HeldGroup,
 }
 
+/// A compute pass with a group 0 for each piece of the table that it takes.
+#[derive(Debug)]
+pub(super) struct PiecewisePass {
+    pub(super) pass: ComputePass,
+    pub(super) groups: HeldGroups,
+}
+
 /// All of a variant's.
 #[derive(Debug)]
 pub(super) struct Passes {
     pub(super) find_facing: Pass,
-    pub(super) extract: Pass,
+    pub(super) extract: PiecewisePass,
     /// Of `interpolated`.
     pub(super) find_sides: Option<Pass>,
     pub(super) list_edges: Pass,
@@ -33,6 +41,7 @@ pub(super) struct Passes {
 #[derive(Clone, Copy)]
 enum Binds {
     Nothing,
+    Positions,
     Triangles,
     TrianglesAndReceivers,
     All,
@@ -56,6 +65,7 @@ impl Passes {
             let (triangles, cutouts) = (Some(&scene.triangles_layout), Some(&scene.cutouts_layout));
             let groups = match binds {
                 Binds::Nothing => vec![Some(own.layout())],
+                Binds::Positions => vec![Some(own.layout()), Some(&scene.positions_layout)],
                 Binds::Triangles => vec![Some(own.layout()), triangles],
                 Binds::TrianglesAndReceivers => {
                     vec![Some(own.layout()), triangles, None, Some(receivers.layout())]
@@ -96,7 +106,7 @@ impl Passes {
         let (extract, find_sides, list_edges) = if variant == Variant::Interpolated {
             let (outline, sides) = (shaders::OUTLINE, shaders::SIDES);
             (
-                pass("wedges outline", outline, "extract_outline", Binds::Triangles, &extract),
+                pass("wedges outline", outline, "extract_outline", Binds::Positions, &extract),
                 Some(pass(
                     "wedges sides",
                     sides,
@@ -112,13 +122,14 @@ impl Passes {
                     "wedges silhouette",
                     shaders::SILHOUETTE,
                     "extract_silhouette",
-                    Binds::Triangles,
+                    Binds::Positions,
                     &extract,
                 ),
                 None,
                 pass("wedges blocks", shaders::BLOCKS, "list_edges", lit, &[READ, READ, WRITE]),
             )
         };
+        let extract = PiecewisePass { pass: extract.pass, groups: HeldGroups::new(extract.group) };
         let write_group = group("wedges write", &[READ]);
         let write = VisibilityPass::new(
             device,

@@ -1,7 +1,7 @@
 //! What lives on the device as long as the scene does: edges with their faces, what each triangle is, the casters' trees.
 
 use scene_core::Scene;
-use scene_core::gpu::{CasterTrees, GpuError, GpuScene, storage_buffer};
+use scene_core::gpu::{CasterTrees, GpuError, GpuScene, binding_limit, storage_buffer, table_buffer};
 
 use crate::Variant;
 use crate::bodies::FaceKind;
@@ -26,7 +26,8 @@ pub struct Tables {
     /// The scene's buffers they were made for.
     made_for: [wgpu::Buffer; 2],
     /// Four words an edge: two vertices; twice where its incidences start, and 1 if its two faces lie in one plane on both
-    /// sides of it; how many incidences.
+    /// sides of it; how many incidences. Passes take it in [`pieces`](scene_core::gpu::pieces), but for those of `interpolated`, which find
+    /// neighbours in it.
     pub edges: wgpu::Buffer,
     /// Twice the face, and 1 if it runs along the edge.
     pub incident: wgpu::Buffer,
@@ -65,7 +66,7 @@ impl Tables {
     ) -> Result<Self, TablesError> {
         let casters = Casters::new(geometry)?;
         let bodies = (variant != Variant::Exact).then(|| casters.bodies());
-        let trees = CasterTrees::new(geometry, &casters.tree);
+        let trees = CasterTrees::new(geometry, &casters.tree, binding_limit(device));
         let topology = bodies.map_or(&*casters.topology, |bodies| &bodies.topology);
         let (mut edges, mut incident) = (Vec::with_capacity(topology.len()), Vec::new());
         for (edge, [a, b]) in topology.vertices().iter().enumerate() {
@@ -83,7 +84,11 @@ impl Tables {
         let buffer = |what, bytes| storage_buffer(device, what, bytes);
         Ok(Self {
             made_for: [scene.positions.clone(), scene.triangles.clone()],
-            edges: buffer("edges", bytemuck::cast_slice(&edges))?,
+            edges: if variant == Variant::Interpolated {
+                buffer("edges", bytemuck::cast_slice(&edges))?
+            } else {
+                table_buffer(device, "edges", bytemuck::cast_slice(&edges))?
+            },
             incident: buffer("faces of edges", bytemuck::cast_slice(&incident))?,
             kinds: buffer("kinds of triangles", bytemuck::cast_slice(&kinds))?,
             nodes: buffer("nodes of the casters' tree", bytemuck::cast_slice(&trees.nodes))?,

@@ -201,7 +201,7 @@ impl PsmOnGpu {
             scene: self.scene.groups(recorder.device, &query.scene),
             drawn: SceneHandles::new(&query.scene),
         });
-        self.receivers.prepare(recorder.device, query);
+        self.receivers.prepare(recorder, query);
         Ok(report)
     }
 

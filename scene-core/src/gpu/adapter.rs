@@ -57,10 +57,7 @@ impl Gpu {
     }
 
     /// [`open_adapter`](Self::open_adapter), with limits that `lower` takes from the adapter's.
-    pub(super) fn open_limited(
-        asked: Option<&str>,
-        lower: impl FnOnce(&mut wgpu::Limits),
-    ) -> Result<Self, GpuError> {
+    fn open_limited(asked: Option<&str>, lower: impl FnOnce(&mut wgpu::Limits)) -> Result<Self, GpuError> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
         let infos: Vec<_> = adapters.iter().map(wgpu::Adapter::get_info).collect();

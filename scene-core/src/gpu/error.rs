@@ -45,7 +45,7 @@ pub enum GpuError {
     /// A resource is larger than the device allows. [`Gpu`](super::Gpu) asks for all that its adapter offers; a renderer's own
     /// device has WebGPU's 128 MiB unless more was asked for, as `max_storage_buffer_binding_size` and `max_buffer_size`.
     #[error(
-        "{what} need {bytes} bytes, but this device binds at most {limit} in one piece: take fewer triangles, smaller or fewer \
+        "{what} need {bytes} bytes, but this device binds at most {limit}: take fewer triangles, smaller or fewer \
          maps, or a smaller image, whichever these are, an adapter that binds more (GNOMON_ADAPTER), or the CPU (--backend cpu)"
     )]
     TooLarge {

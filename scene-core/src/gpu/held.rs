@@ -2,6 +2,8 @@
 //!
 //! Nothing is overwritten in place: a frame that was recorded but not yet submitted keeps what it was recorded with.
 
+use std::ops::Range;
+
 use super::pipeline::count_layout;
 use super::storage::filled_buffer;
 
@@ -69,6 +71,14 @@ impl Bound {
             Self::Texture(view) => wgpu::BindingResource::TextureView(view),
             Self::Sampler(sampler) => wgpu::BindingResource::Sampler(sampler),
         }
+    }
+}
+
+impl Bound {
+    /// Elements of a table, of `bytes` bytes each: a range as [`pieces`](super::pieces) gives them, or with one element more.
+    pub fn elements(buffer: &wgpu::Buffer, range: Range<u32>, bytes: u64) -> Self {
+        let [start, end] = [range.start, range.end].map(|element| u64::from(element) * bytes);
+        Self::Part { buffer: buffer.clone(), offset: start, size: end - start }
     }
 }
 
@@ -183,6 +193,26 @@ impl HeldGroup {
         });
         self.held = Some((bound.to_vec(), group.clone()));
         group
+    }
+}
+
+/// Groups of one layout, for what a pass takes piece by piece.
+#[derive(Debug)]
+pub struct HeldGroups(Vec<HeldGroup>);
+
+impl HeldGroups {
+    /// As many as will be asked for, of the layout of `first`.
+    pub fn new(first: HeldGroup) -> Self {
+        Self(vec![first])
+    }
+
+    /// The group of piece `index`, counted from 0, as [`HeldGroup::get`].
+    pub fn get(&mut self, device: &wgpu::Device, index: usize, bound: &[Bound]) -> wgpu::BindGroup {
+        let another = self.0[0].another();
+        if index >= self.0.len() {
+            self.0.resize_with(index + 1, || another.another());
+        }
+        self.0[index].get(device, bound)
     }
 }
 

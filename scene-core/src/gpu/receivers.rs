@@ -2,7 +2,7 @@
 
 use super::held::{Bound, HeldBuffer, HeldGroup, binding};
 use super::layout::{CameraUniform, LightUniform};
-use super::{GpuGBuffer, GpuObject, GpuShadowQuery};
+use super::{GpuGBuffer, GpuObject, GpuShadowQuery, Recorder};
 use crate::Camera;
 
 /// Group 3 of `receivers.wesl`, kept from frame to frame.
@@ -11,20 +11,23 @@ pub struct Receivers {
     group: HeldGroup,
     camera: HeldBuffer,
     light: HeldBuffer,
-    unshadowed: HeldBuffer,
-    prepared: Option<[wgpu::Buffer; 2]>,
+    unshadowed: Option<(Vec<u32>, wgpu::TextureView)>,
+    prepared: Option<(wgpu::Buffer, wgpu::TextureView)>,
 }
+
+/// Words a row of the texture of objects that show no shadows: a width that every device has, and as many rows hold 2²⁷ objects.
+const ROW_WORDS: usize = 2048;
 
 impl Receivers {
     /// The layout, for fragment and compute stages.
     pub fn new(device: &wgpu::Device) -> Self {
         let stages = wgpu::ShaderStages::FRAGMENT | wgpu::ShaderStages::COMPUTE;
-        let types = [binding::UNIFORM, binding::UNIFORM, binding::FLOATS, binding::IDS, binding::STORAGE];
+        let types = [binding::UNIFORM, binding::UNIFORM, binding::FLOATS, binding::IDS, binding::IDS];
         Self {
             group: HeldGroup::new(device, "receivers", stages, &types),
             camera: HeldBuffer::uniform("camera"),
             light: HeldBuffer::uniform("light"),
-            unshadowed: HeldBuffer::storage("objects without shadows"),
+            unshadowed: None,
             prepared: None,
         }
     }
@@ -35,11 +38,16 @@ impl Receivers {
     }
 
     /// Takes over the light, and which objects show shadows.
-    pub fn prepare(&mut self, device: &wgpu::Device, query: &GpuShadowQuery<'_>) {
-        let light = self.light.get(device, bytemuck::bytes_of(&LightUniform::new(query.light)));
+    pub fn prepare(&mut self, recorder: &Recorder<'_>, query: &GpuShadowQuery<'_>) {
+        let light = self.light.get(recorder.device, bytemuck::bytes_of(&LightUniform::new(query.light)));
         let words = unshadowed_words(query.scene.objects);
-        let unshadowed = self.unshadowed.get(device, bytemuck::cast_slice(&words));
-        self.prepared = Some([light, unshadowed]);
+        let held = self.unshadowed.take().filter(|(held, _)| *held == words);
+        let (words, unshadowed) = held.unwrap_or_else(|| {
+            let texture = unshadowed_texture(recorder, &words);
+            (words, texture)
+        });
+        self.prepared = Some((light, unshadowed.clone()));
+        self.unshadowed = Some((words, unshadowed));
     }
 
     /// Group 3 for what `camera` sees; `None` if nothing was prepared.
@@ -49,16 +57,47 @@ impl Receivers {
         camera: &Camera,
         gbuffer: &GpuGBuffer<'_>,
     ) -> Option<wgpu::BindGroup> {
-        let [light, unshadowed] = self.prepared.clone()?;
+        let (light, unshadowed) = self.prepared.clone()?;
         let camera = CameraUniform { lift: gbuffer.lift, ..CameraUniform::new(camera) };
         let camera = self.camera.get(device, bytemuck::bytes_of(&camera));
-        let bound: [Bound; 5] =
-            [camera.into(), light.into(), gbuffer.surface.into(), gbuffer.object.into(), unshadowed.into()];
+        let bound: [Bound; 5] = [
+            camera.into(),
+            light.into(),
+            gbuffer.surface.into(),
+            gbuffer.object.into(),
+            (&unshadowed).into(),
+        ];
         Some(self.group.get(device, &bound))
     }
 }
 
-/// One bit an object that does not receive, up to the last such one; a binding must not be empty.
+/// A texture of these words, row by row. One is made for each change and filled once, before whatever was recorded.
+fn unshadowed_texture(recorder: &Recorder<'_>, words: &[u32]) -> wgpu::TextureView {
+    let width = words.len().min(ROW_WORDS);
+    let mut words = words.to_vec();
+    words.resize(words.len().next_multiple_of(width), 0);
+    let size = wgpu::Extent3d {
+        width: width as u32,
+        height: (words.len() / width) as u32,
+        depth_or_array_layers: 1,
+    };
+    let texture = recorder.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("objects without shadows"),
+        size,
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::R32Uint,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    let layout =
+        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * size.width), rows_per_image: None };
+    recorder.queue.write_texture(texture.as_image_copy(), bytemuck::cast_slice(&words), layout, size);
+    texture.create_view(&Default::default())
+}
+
+/// One bit an object that does not receive, up to the last such one; a texture must not be empty.
 fn unshadowed_words(objects: &[GpuObject]) -> Vec<u32> {
     let mut words = vec![0; 1];
     for id in (0..objects.len()).filter(|&id| !objects[id].flags.receives) {

@@ -7,7 +7,7 @@ use glam::Affine3A;
 
 use super::GpuError;
 use super::pipeline::count_layout;
-use super::storage::storage_buffer_for;
+use super::storage::{binding_limit, buffer_within, page_bytes, storage_buffer_for};
 use crate::geometry::{Aabb, AlphaMask, ObjectFlags, Wrap};
 use crate::{Scene, TriangleMesh};
 
@@ -25,6 +25,9 @@ pub struct GpuObject {
 }
 
 /// A scene in the caller's buffers, world space, as [`Scene`] holds it.
+///
+/// Positions are bound in two pieces where they are more than the device binds in one: up to twice its
+/// `max_storage_buffer_binding_size`, which is 256 MiB and 22 million vertices by WebGPU's defaults. All else is bound in one.
 #[derive(Clone, Copy, Debug)]
 pub struct GpuScene<'a> {
     /// Vertex positions: three tightly packed f32 each. Usages `VERTEX | STORAGE`.
@@ -129,15 +132,14 @@ impl SceneBuffers {
     /// Copies `scene` to `device`.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`] if an array is larger than the device binds in one piece.
+    /// [`GpuError::TooLarge`] if an array is larger than the device binds in one piece, or positions in two.
     pub fn new(device: &wgpu::Device, scene: &Scene) -> Result<Self, GpuError> {
         let buffer = |what: &'static str, bytes: &[u8], usage| {
             // A binding must not be empty: an empty scene has one vertex and one triangle that nobody draws.
             let contents = if bytes.is_empty() { &[0; 12] } else { bytes };
             storage_buffer_for(device, what, contents, usage)
         };
-        let positions =
-            buffer("vertex positions", bytemuck::cast_slice(scene.positions()), wgpu::BufferUsages::VERTEX)?;
+        let positions = position_buffer(device, bytemuck::cast_slice(scene.positions()))?;
         let triangles =
             buffer("triangles", bytemuck::cast_slice(scene.triangles()), wgpu::BufferUsages::INDEX)?;
         let none = wgpu::BufferUsages::empty();
@@ -173,6 +175,33 @@ impl SceneBuffers {
     }
 }
 
+/// A vertex position.
+const POSITION_BYTES: u64 = 12;
+
+/// Vertex positions, no more than the device binds in two pieces.
+fn position_buffer(device: &wgpu::Device, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
+    // A binding must not be empty: an empty scene has one vertex that nobody draws.
+    let contents = if bytes.is_empty() { &[0; POSITION_BYTES as usize] } else { bytes };
+    let pieces = page_bytes(device, POSITION_BYTES) + binding_limit(device);
+    let limit = pieces.min(device.limits().max_buffer_size);
+    buffer_within(device, "vertex positions", contents, wgpu::BufferUsages::VERTEX, limit)
+}
+
+/// The two pieces that positions are bound in: `positions` and `positions_beyond` of `scene.wesl`. Where one is enough the other
+/// is the first vertex again, which nobody reads.
+fn position_pieces<'a>(device: &wgpu::Device, positions: &'a wgpu::Buffer) -> [wgpu::BindingResource<'a>; 2] {
+    let piece = |range: Range<u64>| {
+        let size = std::num::NonZeroU64::new(range.end - range.start);
+        wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer: positions, offset: range.start, size })
+    };
+    let (bytes, first) = (positions.size(), page_bytes(device, POSITION_BYTES));
+    if bytes > binding_limit(device) && first > 0 {
+        [piece(0..first), piece(first..bytes)]
+    } else {
+        [piece(0..bytes), piece(0..POSITION_BYTES.min(bytes))]
+    }
+}
+
 /// The words of [`GpuCutouts::masks`] for objects with these masks.
 ///
 /// One word an object says where its mask starts, `u32::MAX` for none. A mask is four words (width, height, wrap
@@ -204,12 +233,21 @@ pub fn mask_words(masks: &[Option<&AlphaMask>]) -> Vec<u32> {
     words
 }
 
+// Places in group 1, `scene.wesl`, and in group 2, `cutout.wesl`.
+const POSITIONS: u32 = 0;
+const TRIANGLES: u32 = 1;
+const POSITIONS_BEYOND: u32 = 2;
+const UVS: u32 = 0;
+const MASKS: u32 = 1;
+
 /// Bind group layouts of a [`GpuScene`], and the groups of the scene last used: group 1 is its triangles, group
 /// 2 its cut-outs, in every shader (`scene.wesl`, `cutout.wesl`).
 #[derive(Debug)]
 pub struct SceneBindings {
-    /// Group 1: positions, triangles.
+    /// Group 1: positions, triangles, and positions beyond what is bound in one piece.
     pub triangles_layout: wgpu::BindGroupLayout,
+    /// Group 1 of what reads positions alone, and of the eight storage buffers of a stage needs one more.
+    pub positions_layout: wgpu::BindGroupLayout,
     /// Group 2: texture coordinates, masks.
     pub cutouts_layout: wgpu::BindGroupLayout,
     held: Option<HeldGroups>,
@@ -226,6 +264,8 @@ struct HeldGroups {
 pub struct SceneGroups {
     /// Group 1.
     pub triangles: wgpu::BindGroup,
+    /// Group 1 without the triangles.
+    pub positions: wgpu::BindGroup,
     /// Group 2, where there are cut-outs.
     pub cutouts: Option<wgpu::BindGroup>,
 }
@@ -233,7 +273,7 @@ pub struct SceneGroups {
 impl SceneBindings {
     /// Layouts that `stages` may read.
     pub fn new(device: &wgpu::Device, stages: wgpu::ShaderStages) -> Self {
-        let layout = |label| {
+        let layout = |label, bindings: &[u32]| {
             let entry = |binding| wgpu::BindGroupLayoutEntry {
                 binding,
                 visibility: stages,
@@ -244,13 +284,19 @@ impl SceneBindings {
                 },
                 count: None,
             };
+            let entries: Vec<_> = bindings.iter().map(|&binding| entry(binding)).collect();
             count_layout();
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
                 label: Some(label),
-                entries: &[entry(0), entry(1)],
+                entries: &entries,
             })
         };
-        Self { triangles_layout: layout("triangles"), cutouts_layout: layout("cut-outs"), held: None }
+        Self {
+            triangles_layout: layout("triangles", &[POSITIONS, TRIANGLES, POSITIONS_BEYOND]),
+            positions_layout: layout("positions", &[POSITIONS, POSITIONS_BEYOND]),
+            cutouts_layout: layout("cut-outs", &[UVS, MASKS]),
+            held: None,
+        }
     }
 
     /// The groups of `scene`; made anew only if its buffers are others than last time.
@@ -265,20 +311,20 @@ impl SceneBindings {
         if let Some(held) = self.held.as_ref().filter(|held| held.buffers == buffers) {
             return held.groups.clone();
         }
-        let group = |layout, buffers: [&wgpu::Buffer; 2]| {
-            let entry = |binding| wgpu::BindGroupEntry {
-                binding,
-                resource: buffers[binding as usize].as_entire_binding(),
-            };
-            device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("scene"),
-                layout,
-                entries: &[entry(0), entry(1)],
-            })
+        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+        let group = |layout, entries: &[wgpu::BindGroupEntry<'_>]| {
+            device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("scene"), layout, entries })
         };
+        let [positions, beyond] = position_pieces(device, scene.positions);
+        let positions = [entry(POSITIONS, positions), entry(POSITIONS_BEYOND, beyond)];
+        let triangles = [entry(TRIANGLES, scene.triangles.as_entire_binding())];
         let groups = SceneGroups {
-            triangles: group(&self.triangles_layout, [scene.positions, scene.triangles]),
-            cutouts: cutouts.map(|cutouts| group(&self.cutouts_layout, [cutouts.uvs, cutouts.masks])),
+            triangles: group(&self.triangles_layout, &[&positions[..], &triangles].concat()),
+            positions: group(&self.positions_layout, &positions),
+            cutouts: cutouts.map(|GpuCutouts { uvs, masks }| {
+                let bound = [entry(UVS, uvs.as_entire_binding()), entry(MASKS, masks.as_entire_binding())];
+                group(&self.cutouts_layout, &bound)
+            }),
         };
         self.held = Some(HeldGroups { buffers, groups: groups.clone() });
         groups

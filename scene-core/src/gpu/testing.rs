@@ -37,6 +37,17 @@ pub fn gpu_within(lower: impl FnOnce(&mut wgpu::Limits)) -> Option<Gpu> {
     }
 }
 
+/// As [`gpu`], a device that binds no more than so many `bytes` of a storage buffer in one piece, and has WebGPU's limits by default
+/// besides: what scenes too large for most tests meet, small ones meet there.
+///
+/// # Panics
+/// As [`gpu`].
+pub fn gpu_that_binds(bytes: u64) -> Option<Gpu> {
+    gpu_within(|limits| {
+        *limits = wgpu::Limits { max_storage_buffer_binding_size: bytes, ..wgpu::Limits::default() };
+    })
+}
+
 /// Runs the compute entry point `main` of `wgsl`, one workgroup of `@workgroup_size(64)` for every 64 `inputs`,
 /// and returns as many outputs.
 ///

@@ -2,7 +2,7 @@
 //!
 //! Input at the edge of what has a meaning gets an answer, never a panic ([`assert_answers`]); points that are not finite stay
 //! unknown ([`assert_answers_free_points`]); buffers of the wrong size are refused ([`assert_refuses_wrong_sizes`]); and a scene
-//! far from zero keeps its shadows ([`far_from_zero`]). All of it goes by the trait, so that it holds for whatever a caller can reach.
+//! far from zero keeps its shadows ([`far_from_zero`]); on a GPU one that is bound in two pieces does, too (`assert_same_in_two_pieces`). All of it goes by the trait, so that it holds for whatever a caller can reach.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -197,6 +197,75 @@ pub fn far_from_zero_on(gpu: &crate::gpu::Gpu, technique: &dyn ShadowTechnique) 
             Err(error) => panic!("{}: {error}", technique.name()),
         }
     })
+}
+
+/// Bytes that the smaller device of [`assert_same_in_two_pieces`] binds of a buffer in one piece.
+#[cfg(feature = "gpu")]
+const PIECE: u64 = 1 << 20;
+
+/// The built-in scene `chess`, with so many vertices that a device which binds a mebibyte in one piece takes them in two, looks
+/// there, bit for bit, as on a device that takes them in one. Under a light with an extent and one without. All else that the technique
+/// binds has to fit: take maps of 256 texels a side or fewer.
+///
+/// # Panics
+/// If not.
+#[cfg(feature = "gpu")]
+pub fn assert_same_in_two_pieces(technique: &dyn ShadowTechnique) {
+    let Ok(setup) = scenes::build("chess", 0.0) else { panic!("chess is built in") };
+    let scene = with_idle_vertices(&setup.scene, PIECE);
+    let bytes = size_of_val(scene.positions()) as u64;
+    assert!(bytes > PIECE && bytes < 2 * PIECE, "{bytes} bytes are not two pieces");
+    let Light::Spot { position, .. } = setup.lights[0] else { panic!("chess has a spot") };
+    let radius = 0.05 * scene.bounds().diagonal();
+    let camera = setup.camera.with_size(96, 72);
+    for light in [setup.lights[0], Light::Sphere { center: position, radius }] {
+        let query = ShadowQuery { scene: &scene, light: &light, camera: &camera };
+        let Some([whole, in_pieces]) = whole_and_in_pieces(technique, &query, PIECE) else { return };
+        let bits = |image: &VisibilityImage| image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        assert!(bits(&whole) == bits(&in_pieces), "{} under a {}", technique.name(), light.kind());
+        assert!(in_pieces.values.contains(&0.0) && in_pieces.values.contains(&1.0), "{}", technique.name());
+    }
+}
+
+/// What a technique answers on the device of a test, and on one that binds no more than `bytes` of a buffer in one piece. `None`
+/// where `GNOMON_GPU=off` asks for that.
+///
+/// # Panics
+/// If it does not answer.
+#[cfg(feature = "gpu")]
+pub fn whole_and_in_pieces(
+    technique: &dyn ShadowTechnique,
+    query: &ShadowQuery<'_>,
+    bytes: u64,
+) -> Option<[VisibilityImage; 2]> {
+    let gpus = [crate::gpu::testing::gpu()?, crate::gpu::testing::gpu_that_binds(bytes)?];
+    Some(gpus.map(|gpu| match gpu.render(technique, query) {
+        Ok(frame) => frame.visibility,
+        Err(error) => panic!("{}: {error}", technique.name()),
+    }))
+}
+
+/// A scene with so many vertices that no triangle has, in the midst of those of each object, that positions are just more than
+/// `bytes`.
+#[cfg(feature = "gpu")]
+fn with_idle_vertices(scene: &Scene, bytes: u64) -> Scene {
+    let idle = bytes as usize / size_of::<Vec3>() / scene.objects().len() + 1;
+    let mut more = Scene::new();
+    for object in scene.objects() {
+        let vertices = &scene.positions()[object.vertices.clone()];
+        let (before, after) = vertices.split_at(vertices.len() / 2);
+        let positions = [before, &vec![vertices[0]; idle], after].concat();
+        let moved = |vertex: u32| {
+            let own = vertex as usize - object.vertices.start;
+            (if own < before.len() { own } else { own + idle }) as u32
+        };
+        let triangles = scene.triangles()[object.triangles.clone()].iter().map(|corners| corners.map(moved));
+        let mesh = TriangleMesh::new(object.name.clone(), positions, triangles.collect());
+        if let Err(error) = more.add(&mesh, Affine3A::IDENTITY, object.flags) {
+            panic!("what was in a scene fits into one: {error}");
+        }
+    }
+    more
 }
 
 fn far_from_zero_by(shade: &dyn Fn(&ShadowQuery<'_>, &GBuffer) -> VisibilityImage) -> FarFromZero {

@@ -77,9 +77,7 @@ fn an_adapter_that_is_not_there_is_named() {
 fn an_array_too_large_to_bind_is_refused_before_it_is_made() {
     let Some(gpu) = testing::gpu() else { return };
     // A device that binds less than the scene needs.
-    let Some(small) = testing::gpu_within(|limits| limits.max_storage_buffer_binding_size = 1 << 12) else {
-        return;
-    };
+    let Some(small) = testing::gpu_that_binds(1 << 12) else { return };
     let mut scene = Scene::new();
     let corners = vec![glam::Vec3::ZERO; 3];
     let mesh = gnomon_scene_core::TriangleMesh::new("many", corners, vec![[0, 1, 2]; 400]);
@@ -91,6 +89,18 @@ fn an_array_too_large_to_bind_is_refused_before_it_is_made() {
         assert!(text.contains(word), "{text}");
     }
     assert!(SceneBuffers::new(&gpu.device, &scene).is_ok());
+    // Positions are bound in two pieces, the first of whole vertices.
+    for (vertices, is_taken) in [(597, true), (598, false)] {
+        let mut scene = Scene::new();
+        let mesh =
+            gnomon_scene_core::TriangleMesh::new("many", vec![glam::Vec3::ZERO; vertices], vec![[0, 1, 2]]);
+        scene.add(&mesh, glam::Affine3A::IDENTITY, Default::default()).unwrap();
+        let made = SceneBuffers::new(&small.device, &scene);
+        assert_eq!(made.is_ok(), is_taken, "{vertices} vertices: {made:?}");
+        if let Err(error) = made {
+            assert_eq!(error, GpuError::TooLarge { what: "vertex positions", bytes: 7176, limit: 7168 });
+        }
+    }
 }
 
 /// Ten million triangles and more are a matter of the adapter, not of what is asked of it.

@@ -175,7 +175,7 @@ impl VariantOnGpu for AliasFree {
             casters: self.casters.get(device, bytemuck::cast_slice(&rows)),
             uniform,
         });
-        self.receivers.prepare(device, query);
+        self.receivers.prepare(recorder, query);
         Ok(report)
     }
 

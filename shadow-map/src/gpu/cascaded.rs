@@ -183,7 +183,7 @@ impl VariantOnGpu for Cascaded {
             fit: self.fit.get(device, bytemuck::bytes_of(&fit)),
             maps: self.maps.get(device, bytemuck::bytes_of(&maps)),
         });
-        self.receivers.prepare(device, query);
+        self.receivers.prepare(recorder, query);
         Ok(report)
     }
 

@@ -130,7 +130,7 @@ impl VariantOnGpu for Lookup {
             }
             self.prepared = Some(Prepared { own: self.own.get(device, &bound), scene });
         }
-        self.receivers.prepare(device, query);
+        self.receivers.prepare(recorder, query);
         report.bytes = self.bytes();
         Ok(report)
     }

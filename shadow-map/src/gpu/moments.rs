@@ -172,7 +172,7 @@ impl VariantOnGpu for Moments {
             let own = [drawn.maps.into(), drawn.views.into(), drawn.ids, bound.into(), moments.into()];
             self.prepared = Some((self.own.get(device, &own), scene));
         }
-        self.receivers.prepare(device, query);
+        self.receivers.prepare(recorder, query);
         report.bytes = self.bytes();
         Ok(report)
     }

@@ -122,7 +122,7 @@ impl VariantOnGpu for MultiView {
             let point = self.point.get(device, bytemuck::bytes_of(&point));
             let bound = [drawn.maps.into(), drawn.views.into(), drawn.ids, sums.clone().into(), point.into()];
             let own = self.own.get(device, &bound);
-            self.receivers.prepare(device, &GpuShadowQuery { scene, light, camera });
+            self.receivers.prepare(recorder, &GpuShadowQuery { scene, light, camera });
             let receivers = self.receivers.group(device, camera, gbuffer).ok_or_else(not_prepared)?;
             self.pass.record(recorder, "shade.lookup", &own, &groups, &receivers, visibility);
         }

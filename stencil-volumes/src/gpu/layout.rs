@@ -25,8 +25,6 @@ pub struct VolumesUniform {
     pub size: [u32; 2],
     /// Triangles of the scene.
     pub triangles: u32,
-    /// Edges of the solid casters.
-    pub edges: u32,
     /// Edges that a block has room for.
     pub capacity: u32,
     /// Nodes of the tree of solid casters.
@@ -43,6 +41,8 @@ pub struct VolumesUniform {
     pub skip_runs: u32,
     /// Ranges of triangles that lie in another's shadow.
     pub shadowed: u32,
+    /// Zero.
+    pub padding: u32,
 }
 
 /// `Projection` of `planar.wesl`.
@@ -86,7 +86,6 @@ mod tests {
                 eye_counts,
                 size,
                 triangles,
-                edges,
                 capacity,
                 solid_nodes,
                 nodes,

@@ -79,7 +79,7 @@ impl PlanarOnGpu {
     ) -> Result<Report, TechniqueError> {
         let mut report = Report::default();
         let flat = report.time("prepare.receivers", |_| FlatReceivers::new(geometry, query.light)).receivers;
-        self.receivers.prepare(recorder.device, query);
+        self.receivers.prepare(recorder, query);
         let casters = (0..).zip(query.scene.objects.iter().cloned());
         let casters = casters.filter(|(_, o)| o.flags.casts && !o.triangles.is_empty()).collect();
         let scene = self.scene.groups(recorder.device, &query.scene);

@@ -3,7 +3,7 @@
 use scene_core::Scene;
 use scene_core::bvh::Bvh;
 use scene_core::geometry::EdgeTopology;
-use scene_core::gpu::{CasterTrees, GpuError, GpuScene, storage_buffer};
+use scene_core::gpu::{CasterTrees, GpuError, GpuScene, binding_limit, storage_buffer, table_buffer};
 
 use crate::error::VolumeError;
 
@@ -23,7 +23,7 @@ pub enum TablesError {
 pub struct Tables {
     /// The scene's buffers they were made for.
     made_for: [wgpu::Buffer; 2],
-    /// Two vertices an edge.
+    /// Two vertices an edge. Passes take it and the next in [`pieces`](scene_core::gpu::pieces).
     pub vertices: wgpu::Buffer,
     /// Where an edge's incidences start, and one more.
     pub first: wgpu::Buffer,
@@ -54,7 +54,7 @@ impl Tables {
         let is_solid = |o: &scene_core::geometry::Object| o.flags.casts && o.alpha.is_none();
         let (topology, trees) = rayon::join(
             || EdgeTopology::of_scene(geometry, is_solid),
-            || CasterTrees::new(geometry, &Bvh::casters(geometry)),
+            || CasterTrees::new(geometry, &Bvh::casters(geometry), binding_limit(device)),
         );
         let topology = topology.map_err(VolumeError::from)?;
         let (mut first, mut incident) = (vec![0_u32], Vec::new());
@@ -70,8 +70,8 @@ impl Tables {
         let buffer = |what, bytes| storage_buffer(device, what, bytes);
         Ok(Self {
             made_for: [scene.positions.clone(), scene.triangles.clone()],
-            vertices: buffer("vertices of edges", bytemuck::cast_slice(topology.vertices()))?,
-            first: buffer("faces of edges", bytemuck::cast_slice(&first))?,
+            vertices: table_buffer(device, "vertices of edges", bytemuck::cast_slice(topology.vertices()))?,
+            first: table_buffer(device, "faces of edges", bytemuck::cast_slice(&first))?,
             incident: buffer("faces of edges", bytemuck::cast_slice(&incident))?,
             casts: buffer("solid casters", bytemuck::cast_slice(&casts))?,
             nodes: buffer("nodes of the casters' tree", bytemuck::cast_slice(&trees.nodes))?,

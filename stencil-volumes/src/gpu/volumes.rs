@@ -2,8 +2,9 @@
 
 use glam::Vec4;
 use scene_core::gpu::{
-    Bound, ComputePass, Gpu, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder,
-    SceneBindings, SceneGroups, VisibilityPass, VisibilityPassParts, WorkBuffer, binding, binding_limit,
+    Bound, ComputePass, Gpu, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, HeldGroups, Receivers,
+    Recorder, SceneBindings, SceneGroups, VisibilityPass, VisibilityPassParts, WorkBuffer, binding,
+    binding_limit, pieces,
 };
 use scene_core::light::LightPoint;
 use scene_core::relevance::CasterRegion;
@@ -41,6 +42,13 @@ const PIXEL_PAIRS: usize = 272;
 /// as many over sides.
 const MOST_EDGES: u32 = 64 << 14;
 
+/// Bytes of an edge's vertices, and of where its faces start.
+const VERTICES_BYTES: u64 = 8;
+const FIRST_BYTES: u64 = 4;
+
+/// Bytes of an edge of the silhouette.
+const EDGE_BYTES: u64 = 16;
+
 /// A compute pass with its group 0.
 #[derive(Debug)]
 struct Pass {
@@ -48,9 +56,17 @@ struct Pass {
     own: HeldGroup,
 }
 
+/// A compute pass with a group 0 for each piece of the tables that it takes.
+#[derive(Debug)]
+struct PiecewisePass {
+    pass: ComputePass,
+    own: HeldGroups,
+}
+
 /// Which of groups 1 to 3 a pass binds.
 #[derive(Clone, Copy)]
 enum Binds {
+    Positions,
     Triangles,
     TrianglesAndReceivers,
     All,
@@ -77,7 +93,7 @@ pub struct VolumesOnGpu {
     scene: SceneBindings,
     receivers: Receivers,
     find_facing: Pass,
-    extract: Pass,
+    extract: PiecewisePass,
     bound_runs: Pass,
     ask: Pass,
     list_edges: Pass,
@@ -109,6 +125,7 @@ impl VolumesOnGpu {
             let own = HeldGroup::new(device, label, stages, &types);
             let (triangles, cutouts) = (Some(&scene.triangles_layout), Some(&scene.cutouts_layout));
             let groups = match binds {
+                Binds::Positions => vec![Some(own.layout()), Some(&scene.positions_layout)],
                 Binds::Triangles => vec![Some(own.layout()), triangles],
                 Binds::TrianglesAndReceivers => {
                     vec![Some(own.layout()), triangles, None, Some(receivers.layout())]
@@ -129,11 +146,12 @@ impl VolumesOnGpu {
             "volumes silhouette",
             shaders::SILHOUETTE,
             "extract_silhouette",
-            Binds::Triangles,
+            Binds::Positions,
             &[READ, READ, READ, READ, WRITE, WRITE],
         );
+        let extract = PiecewisePass { pass: extract.pass, own: HeldGroups::new(extract.own) };
         let bound_runs =
-            pass("volumes runs", shaders::RUNS, "bound_runs", Binds::Triangles, &[READ, READ, WRITE]);
+            pass("volumes runs", shaders::RUNS, "bound_runs", Binds::Positions, &[READ, READ, WRITE]);
         let ask = pass("volumes ask", shaders::ASK, "ask", lit, &[READ, READ, WRITE, WRITE]);
         let list_edges =
             pass("volumes blocks", shaders::BLOCKS, "list_edges", lit, &[READ, WRITE, READ, WRITE, READ]);
@@ -213,12 +231,11 @@ impl VolumesOnGpu {
         let settings = self.settings.get(device, bytemuck::bytes_of(&uniform));
         let facing = self.facing.get(device, 4 * u64::from(tables.triangles))?;
         let counters = self.counters.get(device, 4 * COUNTERS)?;
-        let edges = self.edges.get(device, 16 * u64::from(tables.edges))?;
+        let edges = self.edges.get(device, silhouette_bytes(tables.edges))?;
         recorder.encoder.clear_buffer(&counters, 0, None);
         let region = self.region.get(device, bytemuck::cast_slice(&planes));
         let shadowed = self.shadowed.get(device, bytemuck::cast_slice(&shadowed));
         let scene = self.scene.groups(device, &query.scene);
-        let triangles = Some(&scene.triangles);
 
         let own = [
             settings.clone().into(),
@@ -229,35 +246,39 @@ impl VolumesOnGpu {
             shadowed.into(),
         ];
         let own = self.find_facing.own.get(device, &own);
-        let groups = [Some(&own), triangles];
+        let groups = [Some(&own), Some(&scene.triangles)];
         self.find_facing.pass.record(recorder, "prepare.facing", &groups, workgroups(tables.triangles));
 
-        let own = [
-            settings.clone().into(),
-            tables.vertices.clone().into(),
-            tables.first.clone().into(),
-            tables.incident.clone().into(),
-            facing.into(),
-            counters.clone().into(),
-            edges.clone().into(),
-        ];
-        let own = self.extract.own.get(device, &own);
-        let groups = [Some(&own), triangles];
-        self.extract.pass.record(recorder, "prepare.silhouette", &groups, workgroups(tables.edges));
+        for (piece, range) in pieces(device, tables.edges, VERTICES_BYTES).enumerate() {
+            let own = [
+                settings.clone().into(),
+                Bound::elements(&tables.vertices, range.clone(), VERTICES_BYTES),
+                Bound::elements(&tables.first, range.start..range.end + 1, FIRST_BYTES),
+                tables.incident.clone().into(),
+                facing.clone().into(),
+                counters.clone().into(),
+                edges.clone().into(),
+            ];
+            let own = self.extract.own.get(device, piece, &own);
+            let groups = [Some(&own), Some(&scene.positions)];
+            let edges = workgroups(range.end - range.start);
+            self.extract.pass.record(recorder, "prepare.silhouette", &groups, edges);
+        }
 
         if self.skips.bounded {
             let runs = self.runs.get(device, run_bytes(&tables))?;
             let own = [settings.into(), edges.into(), counters.into(), runs.into()];
             let own = self.bound_runs.own.get(device, &own);
-            let groups = [Some(&own), triangles];
-            self.bound_runs.pass.record(recorder, "prepare.runs", &groups, workgroups(tables.edges));
+            let groups = [Some(&own), Some(&scene.positions)];
+            let edges = workgroups(tables.edges.min(MOST_EDGES));
+            self.bound_runs.pass.record(recorder, "prepare.runs", &groups, edges);
         }
 
         let cutouts = scene.cutouts.clone().unwrap_or_else(|| {
             let none: Bound = self.no_masks.get(device, &[]).into();
             self.no_cutouts.get(device, &[none.clone(), none])
         });
-        self.receivers.prepare(device, query);
+        self.receivers.prepare(recorder, query);
         self.tables = Some(tables);
         self.prepared = Some(Prepared { uniform, scene, cutouts });
         report.bytes = self.bytes();
@@ -291,7 +312,6 @@ impl VolumesOnGpu {
             eye_counts: u32::from(self.params.count != Count::ZPass),
             size: [camera.width, camera.height],
             triangles: tables.triangles,
-            edges: tables.edges,
             capacity: u64::from(tables.edges).min(room.saturating_sub(2)) as u32,
             solid_nodes: tables.solid_nodes,
             nodes: tables.all_nodes,
@@ -300,6 +320,7 @@ impl VolumesOnGpu {
             skip_unlit: u32::from(self.skips.unlit),
             skip_runs: u32::from(self.skips.bounded),
             shadowed,
+            padding: 0,
         }
     }
 
@@ -330,7 +351,7 @@ impl VolumesOnGpu {
         let counters = self.counters.get(device, 4 * COUNTERS)?;
         recorder.encoder.clear_buffer(&counters, 4 * UNLIT_PIXELS as u64, None);
         let counters: Bound = counters.into();
-        let edges: Bound = self.edges.get(device, 16 * u64::from(tables.edges))?.into();
+        let edges: Bound = self.edges.get(device, silhouette_bytes(tables.edges))?.into();
         let nodes: Bound = tables.nodes.clone().into();
         let leaves: Bound = tables.leaves.clone().into();
 
@@ -463,7 +484,12 @@ fn shadowed_ranges(scene: &Scene, light: &Light, report: &mut Report) -> Vec<[u3
 
 /// Bytes of the boxes around all runs that there may be: room for one where there are no edges, as a binding holds an element.
 fn run_bytes(tables: &Tables) -> u64 {
-    32 * u64::from(tables.edges).div_ceil(RUN as u64).max(1)
+    32 * u64::from(tables.edges.min(MOST_EDGES)).div_ceil(RUN as u64).max(1)
+}
+
+/// Room for the silhouette of so many edges: no more of them are counted than [`MOST_EDGES`].
+fn silhouette_bytes(edges: u32) -> u64 {
+    EDGE_BYTES * u64::from(edges.min(MOST_EDGES))
 }
 
 /// Workgroups of 64 for so many elements, in two dimensions.
