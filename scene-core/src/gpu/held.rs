@@ -208,9 +208,8 @@ impl HeldGroups {
 
     /// The group of piece `index`, counted from 0, as [`HeldGroup::get`].
     pub fn get(&mut self, device: &wgpu::Device, index: usize, bound: &[Bound]) -> wgpu::BindGroup {
-        let another = self.0[0].another();
-        if index >= self.0.len() {
-            self.0.resize_with(index + 1, || another.another());
+        while self.0.len() <= index {
+            self.0.push(self.0[0].another());
         }
         self.0[index].get(device, bound)
     }
