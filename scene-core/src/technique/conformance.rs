@@ -201,9 +201,9 @@ pub fn far_from_zero_on(gpu: &crate::gpu::Gpu, technique: &dyn ShadowTechnique) 
 
 /// Bytes that the smaller device of [`assert_same_in_two_pieces`] binds of a buffer in one piece.
 #[cfg(feature = "gpu")]
-const PIECE: u64 = 1 << 20;
+const PIECE: u64 = 16 << 20;
 
-/// The built-in scene `chess`, with so many vertices that a device which binds a mebibyte in one piece takes them in two, looks
+/// The built-in scene `chess`, with so many vertices that a device which binds 16 MiB in one piece takes them in two, looks
 /// there, bit for bit, as on a device that takes them in one. Under a light with an extent and one without. All else that the technique
 /// binds has to fit: take maps of 256 texels a side or fewer.
 ///

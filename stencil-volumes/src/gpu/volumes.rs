@@ -231,7 +231,7 @@ impl VolumesOnGpu {
         let settings = self.settings.get(device, bytemuck::bytes_of(&uniform));
         let facing = self.facing.get(device, 4 * u64::from(tables.triangles))?;
         let counters = self.counters.get(device, 4 * COUNTERS)?;
-        let edges = self.edges.get(device, silhouette_bytes(tables.edges))?;
+        let edges = self.edges.get(device, silhouette_bytes(device, tables.edges))?;
         recorder.encoder.clear_buffer(&counters, 0, None);
         let region = self.region.get(device, bytemuck::cast_slice(&planes));
         let shadowed = self.shadowed.get(device, bytemuck::cast_slice(&shadowed));
@@ -316,7 +316,7 @@ impl VolumesOnGpu {
             solid_nodes: tables.solid_nodes,
             nodes: tables.all_nodes,
             dense: if rays { DENSE } else { MOST_EDGES / 64 },
-            most_edges: MOST_EDGES.min(if rays { most_edges(camera) as u32 } else { u32::MAX }),
+            most_edges: most_listed(device).min(if rays { most_edges(camera) as u32 } else { u32::MAX }),
             skip_unlit: u32::from(self.skips.unlit),
             skip_runs: u32::from(self.skips.bounded),
             shadowed,
@@ -351,7 +351,7 @@ impl VolumesOnGpu {
         let counters = self.counters.get(device, 4 * COUNTERS)?;
         recorder.encoder.clear_buffer(&counters, 4 * UNLIT_PIXELS as u64, None);
         let counters: Bound = counters.into();
-        let edges: Bound = self.edges.get(device, silhouette_bytes(tables.edges))?.into();
+        let edges: Bound = self.edges.get(device, silhouette_bytes(device, tables.edges))?.into();
         let nodes: Bound = tables.nodes.clone().into();
         let leaves: Bound = tables.leaves.clone().into();
 
@@ -487,9 +487,14 @@ fn run_bytes(tables: &Tables) -> u64 {
     32 * u64::from(tables.edges.min(MOST_EDGES)).div_ceil(RUN as u64).max(1)
 }
 
-/// Room for the silhouette of so many edges: no more of them are counted than [`MOST_EDGES`].
-fn silhouette_bytes(edges: u32) -> u64 {
-    EDGE_BYTES * u64::from(edges.min(MOST_EDGES))
+/// Edges of a silhouette that are listed, at most: where there are more, rays decide about all pixels.
+fn most_listed(device: &wgpu::Device) -> u32 {
+    u64::from(MOST_EDGES).min(binding_limit(device) / EDGE_BYTES) as u32
+}
+
+/// Room for the silhouette of so many edges.
+fn silhouette_bytes(device: &wgpu::Device, edges: u32) -> u64 {
+    EDGE_BYTES * u64::from(edges.min(most_listed(device)))
 }
 
 /// Workgroups of 64 for so many elements, in two dimensions.
