@@ -34,6 +34,15 @@ impl Console {
         written.and_then(|()| out.flush()).map_err(CliError::Stdout)
     }
 
+    /// Prints a line of a result that comes line by line; nothing with `--json`, whose object comes whole.
+    pub(crate) fn row(&self, text: &str) -> Result<(), CliError> {
+        if self.json {
+            return Ok(());
+        }
+        let mut out = std::io::stdout().lock();
+        writeln!(out, "{text}").and_then(|()| out.flush()).map_err(CliError::Stdout)
+    }
+
     /// Tells the user something that is not the result.
     pub(crate) fn note(&self, text: &str) {
         stderr_line(text);
@@ -93,6 +102,11 @@ impl Progress {
         if position > self.0.position() {
             self.0.set_position(position);
         }
+    }
+
+    /// Lets `print` write to the terminal, the bar out of its way.
+    pub(crate) fn above<T>(&self, print: impl FnOnce() -> T) -> T {
+        self.0.suspend(print)
     }
 }
 

@@ -1,4 +1,4 @@
-//! `gnomon audit`: what skipping saves, and that it changes no image.
+//! `gnomon audit`: what skipping saves, and that it changes no image. Rows are printed as they come: all of them take long.
 
 use scene_core::VisibilityImage;
 use scene_core::raster::render_gbuffer;
@@ -9,7 +9,7 @@ use crate::args::{AuditArgs, SceneArgs};
 use crate::backend::{self, Side};
 use crate::bench::record::median;
 use crate::compare::skipped;
-use crate::compare::table::{aligned, milliseconds};
+use crate::compare::table::milliseconds;
 use crate::console::Console;
 use crate::error::{CliError, count_of};
 use crate::measure::{Repeated, Repeats, Stand};
@@ -56,7 +56,9 @@ pub(crate) fn run(args: &AuditArgs, console: &Console) -> Result<(), CliError> {
     let pairs = pairs(&args.techniques, args.variants, args.seed)?;
     let gpu = backend::open(&args.backend)?;
     let names = scene_source::or_built_in(&args.scenes);
+    let columns = Columns::new(&names, &pairs);
     let bar = console.progress("audit");
+    let steps = (names.len() * pairs.len()) as f32;
     let mut cells: Vec<Cell> = Vec::new();
     for (number, name) in names.iter().enumerate() {
         let scene = SceneArgs {
@@ -69,20 +71,23 @@ pub(crate) fn run(args: &AuditArgs, console: &Console) -> Result<(), CliError> {
         let view = scene_source::view(&scene, console)?;
         let gbuffer = render_gbuffer(&view.setup.scene, &view.setup.camera);
         let mut stand = Stand::new(&view, &gbuffer, gpu.as_ref());
-        for pair in &pairs {
+        for (done, pair) in pairs.iter().enumerate() {
             let sides = backend::sides(pair.on.as_ref(), &args.backend, gpu.is_some());
             for side in sides.into_iter().filter_map(|(_, side)| side) {
                 if let Some(cell) = cell(&mut stand, pair, side, args.runs, name)? {
+                    if cells.is_empty() {
+                        bar.above(|| console.row(&columns.headings()))?;
+                    }
+                    bar.above(|| console.row(&columns.row(&cell)))?;
                     cells.push(cell);
                 }
             }
+            bar.set((number * pairs.len() + done + 1) as f32 / steps);
         }
-        bar.set((number + 1) as f32 / names.len() as f32);
     }
     drop(bar);
     let changed = cells.iter().filter(|cell| cell.differing_pixels > 0).count();
-    let text = table(&cells);
-    console.result(&AuditReport { cells, changed }, &text)?;
+    console.result(&AuditReport { cells, changed }, "")?;
     if changed > 0 {
         return Err(CliError::CheckFailed(count_of(changed, "image") + " changed by skipping"));
     }
@@ -162,25 +167,44 @@ fn differing(a: &VisibilityImage, b: &VisibilityImage) -> usize {
     a.values.iter().zip(&b.values).filter(|&pair| differ(pair)).count()
 }
 
-/// A row a cell.
-fn table(cells: &[Cell]) -> String {
-    let mut lines = vec![
-        ["scene", "technique", "backend", "on ms", "off ms", "off / on", "differ", "left out"]
-            .map(str::to_owned),
-    ];
-    lines.extend(cells.iter().map(|cell| {
-        [
-            cell.scene.clone(),
-            cell.technique.clone(),
-            cell.backend.to_owned(),
-            milliseconds(cell.on_ms),
-            milliseconds(cell.off_ms),
-            format!("{:.2}", cell.off_ms / cell.on_ms),
-            cell.differing_pixels.to_string(),
-            cell.left_out.clone(),
-        ]
-    }));
-    aligned(&lines)
+/// Widths of the columns whose words are of any length; known before the first row is.
+struct Columns {
+    scene: usize,
+    technique: usize,
+}
+
+impl Columns {
+    fn new(scenes: &[String], pairs: &[Pair]) -> Self {
+        let widest = |words: &mut dyn Iterator<Item = &str>| words.map(|word| word.chars().count()).max();
+        let scene = widest(&mut scenes.iter().map(String::as_str).chain(["scene"])).unwrap_or(0);
+        let labels = pairs.iter().map(|pair| pair.label.as_str());
+        let technique = widest(&mut labels.chain(["technique"])).unwrap_or(0);
+        Self { scene, technique }
+    }
+
+    fn headings(&self) -> String {
+        self.line(["scene", "technique", "backend", "on ms", "off ms", "off / on", "differ", "left out"])
+    }
+
+    fn row(&self, cell: &Cell) -> String {
+        self.line([
+            &cell.scene,
+            &cell.technique,
+            cell.backend,
+            &milliseconds(cell.on_ms),
+            &milliseconds(cell.off_ms),
+            &format!("{:.2}", cell.off_ms / cell.on_ms),
+            &cell.differing_pixels.to_string(),
+            &cell.left_out,
+        ])
+    }
+
+    fn line(&self, [scene, technique, backend, on, off, ratio, differ, left_out]: [&str; 8]) -> String {
+        let Self { scene: scene_width, technique: technique_width } = self;
+        format!(
+            "{scene:<scene_width$}  {technique:<technique_width$}  {backend:<7}  {on:>7}  {off:>7}  {ratio:>8}  {differ:>6}  {left_out}"
+        )
+    }
 }
 
 #[cfg(test)]
@@ -192,6 +216,24 @@ mod tests {
         let image = |values: [f32; 3]| VisibilityImage { width: 3, height: 1, values: values.to_vec() };
         assert_eq!(differing(&image([0.0, f32::NAN, 0.5]), &image([0.0, f32::NAN, 0.5])), 0);
         assert_eq!(differing(&image([0.0, f32::NAN, 0.5]), &image([1e-9, 0.0, 0.5])), 2);
+    }
+
+    #[test]
+    fn columns_are_aligned_before_all_rows_are_known() {
+        let pairs = pairs(&["psm".to_owned()], false, 0).unwrap();
+        let columns = Columns::new(&["a scene".to_owned()], &pairs);
+        let cell = Cell {
+            scene: "a scene".to_owned(),
+            technique: pairs[0].label.clone(),
+            backend: "cpu",
+            on_ms: 1.0,
+            off_ms: 2.5,
+            differing_pixels: 0,
+            left_out: "nothing".to_owned(),
+        };
+        let (headings, row) = (columns.headings(), columns.row(&cell));
+        assert_eq!(headings.find("left out"), row.find("nothing"));
+        assert!(row.contains("    1.00     2.50      2.50       0"), "{row}");
     }
 
     #[test]
