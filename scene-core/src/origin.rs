@@ -54,6 +54,14 @@ impl Origin {
         point - self.place
     }
 
+    /// Points of the world, copied only if they move.
+    pub fn points(self, points: &[Vec3]) -> Cow<'_, [Vec3]> {
+        if self.is_world() {
+            return Cow::Borrowed(points);
+        }
+        Cow::Owned(points.iter().map(|&point| self.point(point)).collect())
+    }
+
     /// A scene, copied only if it moves.
     pub fn scene(self, scene: &Scene) -> Cow<'_, Scene> {
         if self.is_world() { Cow::Borrowed(scene) } else { Cow::Owned(scene.counted_from(self.place)) }

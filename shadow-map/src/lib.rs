@@ -39,7 +39,7 @@ use std::fmt::Debug;
 
 use glam::Vec3;
 use scene_core::relevance::{Backdrops, CasterChunks, Receivers};
-use scene_core::{Camera, GBuffer, Light, Report, Scene, VisibilityImage};
+use scene_core::{Camera, GBuffer, Light, Origin, Report, Scene, VisibilityImage};
 
 use cascaded::Cascaded;
 use hard::Hard;
@@ -64,6 +64,8 @@ pub struct ShadowMap {
 /// A light, prepared by one of the variants, borrowing the scene it shines on.
 #[derive(Debug)]
 pub struct PreparedShadowMap<'a> {
+    /// What the variant's coordinates are counted from.
+    origin: Origin,
     variant: Box<dyn PreparedVariant + 'a>,
 }
 
@@ -121,11 +123,11 @@ impl ShadowMap {
         })
     }
 
-    /// Takes maps that were drawn elsewhere. Variants that draw their own while shading (`cascaded`, `multi-view`,
+    /// Takes maps that were drawn elsewhere; what is asked has to be counted from their [origin](LightMaps::origin). Variants that draw their own while shading (`cascaded`, `multi-view`,
     /// `alias-free`) look them up as `hard` does.
     pub fn prepare_maps<'a>(&self, maps: LightMaps<'a>) -> (PreparedShadowMap<'a>, Report) {
         let mut report = Report::default();
-        (PreparedShadowMap { variant: self.over(maps, &mut report) }, report)
+        (PreparedShadowMap { origin: Origin::WORLD, variant: self.over(maps, &mut report) }, report)
     }
 
     /// The variant over one set of maps.
@@ -149,24 +151,33 @@ impl ShadowMap {
         choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<Vec<ViewNeeds>>,
     ) -> (PreparedShadowMap<'a>, Report) {
         let (mut report, params) = (Report::default(), &self.params);
-        let draw = |report: &mut Report| LightMaps::draw(scene, light, params, report, choose);
-        let variant: Box<dyn PreparedVariant + 'a> = match params.variant {
+        let over_maps = |report: &mut Report| {
+            let maps = LightMaps::draw_near(scene, light, params, report, choose);
+            (maps.origin, self.over(maps, report))
+        };
+        let (origin, variant): (Origin, Box<dyn PreparedVariant + 'a>) = match params.variant {
             Variant::Cascaded => match Cascaded::new(scene, light, params, &mut report) {
-                Some(cascaded) => Box::new(cascaded),
-                None => self.over(draw(&mut report), &mut report),
+                Some(cascaded) => (Origin::WORLD, Box::new(cascaded)),
+                None => over_maps(&mut report),
             },
-            Variant::MultiView => Box::new(MultiView::new(scene, light, params, &mut report)),
-            Variant::AliasFree => Box::new(alias_free::Prepared::new(scene, light, params.skip, &mut report)),
+            Variant::MultiView => {
+                let views = MultiView::new(scene, light, params, &mut report);
+                (views.origin, Box::new(views))
+            }
+            Variant::AliasFree => {
+                let casters = alias_free::Prepared::new(scene, light, params.skip, &mut report);
+                (Origin::WORLD, Box::new(casters))
+            }
             Variant::Hard | Variant::Pcf | Variant::Pcss | Variant::ObjectId | Variant::Moments => {
-                self.over(draw(&mut report), &mut report)
+                over_maps(&mut report)
             }
         };
-        (PreparedShadowMap { variant }, report)
+        (PreparedShadowMap { origin, variant }, report)
     }
 }
 
 impl PreparedShadowMap<'_> {
-    /// The maps, one a view.
+    /// The maps, one a view, in coordinates counted [from the scene](Origin::near) if it lies far from zero.
     pub fn maps(&self) -> &[ShadowMapView] {
         self.variant.maps()
     }
@@ -179,7 +190,7 @@ impl PreparedShadowMap<'_> {
     /// Fills `visibility`, which must have the G-buffer's size: V where a surface is seen, NaN elsewhere.
     pub fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Report {
         let mut report = Report::default();
-        self.variant.shade(gbuffer, visibility, &mut report);
+        self.variant.shade(&self.origin.gbuffer(gbuffer), visibility, &mut report);
         report
     }
 
@@ -187,7 +198,7 @@ impl PreparedShadowMap<'_> {
     /// longer one has more is left alone.
     pub fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Report {
         let mut report = Report::default();
-        self.variant.visibility_at(points, visibility, &mut report);
+        self.variant.visibility_at(&self.origin.points(points), visibility, &mut report);
         report
     }
 }

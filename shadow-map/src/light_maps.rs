@@ -149,9 +149,18 @@ impl<'a> LightMaps<'a> {
     }
 
     /// The same in coordinates counted [from the scene](Origin::near) if it lies far from zero. What is asked has to be
-    /// counted from [`origin`](Self::origin), too.
-    pub fn draw_near(scene: &'a Scene, light: &Light, params: &ShadowMapParams, report: &mut Report) -> Self {
+    /// counted from [`origin`](Self::origin), too. `choose`, whose bounds are of the world, is then not asked.
+    pub fn draw_near(
+        scene: &'a Scene,
+        light: &Light,
+        params: &ShadowMapParams,
+        report: &mut Report,
+        choose: impl FnOnce(&Backdrops<'_>, &[LightView], &mut Report) -> Option<Vec<ViewNeeds>>,
+    ) -> Self {
         let origin = Origin::near(scene.bounds());
+        if origin.is_world() {
+            return Self::draw(scene, light, params, report, choose);
+        }
         Self::draw_in(origin, origin.scene(scene), origin.light(light), params, report, |_, _, _| None)
     }
 

@@ -33,7 +33,9 @@ use crate::{PreparedVariant, ShadowMapParams};
 /// The variant. Nothing is drawn before there are receivers.
 #[derive(Debug)]
 pub(crate) struct MultiView<'a> {
-    scene: &'a Scene,
+    /// What coordinates of all that follows, and of all that is asked, are counted from.
+    pub(crate) origin: Origin,
+    scene: Cow<'a, Scene>,
     light: Light,
     params: ShadowMapParams,
     chunks: CasterChunks,
@@ -66,11 +68,13 @@ impl<'a> MultiView<'a> {
         params: &ShadowMapParams,
         report: &mut Report,
     ) -> Self {
+        let origin = Origin::near(scene.bounds());
+        let scene = origin.scene(scene);
         let chunks = report.time("prepare.chunks", |_| {
-            if params.skip { CasterChunks::new(scene) } else { CasterChunks::default() }
+            if params.skip { CasterChunks::new(&scene) } else { CasterChunks::default() }
         });
         report.bytes += chunks.bytes() as u64;
-        Self { scene, light: *light, params: *params, chunks }
+        Self { origin, scene, light: origin.light(light), params: *params, chunks }
     }
 
     /// Calls `shade` with the maps of one point of the light after another.
@@ -79,10 +83,11 @@ impl<'a> MultiView<'a> {
         boxes: &[Aabb],
         bounds: Aabb,
         report: &mut Report,
-        mut shade: impl FnMut(&LightMaps<'a>, LightPoint, &mut Report),
+        mut shade: impl FnMut(&LightMaps<'_>, LightPoint, &mut Report),
     ) {
+        let scene = self.scene.as_ref();
         // Of the whole scene, so that points stay where they are when the camera moves.
-        let seen_from = self.scene.bounds().union(bounds);
+        let seen_from = scene.bounds().union(bounds);
         let points = light_points(&self.light, seen_from, self.params.views, self.params.seed);
         let mut scratch = RasterScratch::new();
         let mut maps: Vec<ShadowMapView> = Vec::new();
@@ -94,10 +99,10 @@ impl<'a> MultiView<'a> {
                 report.skip("views", 1);
                 continue;
             }
-            let tolerance = plane_tolerance(self.scene.bounds(), &light);
+            let tolerance = plane_tolerance(scene.bounds(), &light);
             let (casters, views) = report.time("shade.views", |_| {
-                let casters = relevance::told_apart_with_solids(self.scene, &light, tolerance);
-                let views = light_views(self.scene, &light, &casters.drawn, self.params.skip);
+                let casters = relevance::told_apart_with_solids(scene, &light, tolerance);
+                let views = light_views(scene, &light, &casters.drawn, self.params.skip);
                 (casters, views)
             });
             report.skip("faces", views.skipped_faces);
@@ -105,13 +110,12 @@ impl<'a> MultiView<'a> {
             let mut windows = None;
             let ranges: Vec<_> = if self.params.skip {
                 report.time("shade.relevance", |report| {
-                    let receivers = Receivers::within(self.scene, boxes, &light);
+                    let receivers = Receivers::within(scene, boxes, &light);
                     let of = |view| looked_up_texels(view, &receivers, size, HARD_REACH);
                     windows = Some(views.views.iter().map(of).collect::<Vec<_>>());
-                    let region =
-                        looked_up_behind(self.scene, &light, &receivers, &views.views, size, HARD_REACH);
-                    let objects = self.scene.objects();
-                    let kept = relevance::relevant_casters(self.scene, &region, &self.chunks, |id| {
+                    let region = looked_up_behind(scene, &light, &receivers, &views.views, size, HARD_REACH);
+                    let objects = scene.objects();
+                    let kept = relevance::relevant_casters(scene, &region, &self.chunks, |id| {
                         !casters.backdrops.iter().any(|b| std::ptr::eq(*b, &objects[id as usize]))
                     });
                     kept.book(report);
@@ -122,7 +126,7 @@ impl<'a> MultiView<'a> {
             };
             report.time("shade.maps", |_| {
                 cpu::render_maps_into(
-                    self.scene,
+                    scene,
                     &ranges,
                     &views.views,
                     windows.as_deref(),
@@ -132,8 +136,8 @@ impl<'a> MultiView<'a> {
                 );
             });
             let light_maps = LightMaps {
-                origin: Origin::WORLD,
-                scene: Cow::Borrowed(self.scene),
+                origin: self.origin,
+                scene: Cow::Borrowed(scene),
                 light,
                 maps: std::mem::take(&mut maps),
                 backdrops: casters.backdrops.into_iter().cloned().collect(),
@@ -149,11 +153,11 @@ impl<'a> MultiView<'a> {
 impl PreparedVariant for MultiView<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage, report: &mut Report) {
         let (boxes, bounds) = report.time("shade.views", |_| {
-            let tiles = TileBounds::of_receivers(self.scene, gbuffer);
+            let tiles = TileBounds::of_receivers(&self.scene, gbuffer);
             (tiles.boxes(), tiles.bounds())
         });
         let (patches, mut answers) = report.time("shade.lookup", |_| match self.params.skip {
-            true => (patches_of(self.scene, gbuffer), vec![0.0; gbuffer.pixel_count()]),
+            true => (patches_of(&self.scene, gbuffer), vec![0.0; gbuffer.pixel_count()]),
             false => Default::default(),
         });
         let mut sums = vec![Sum::default(); gbuffer.pixel_count()];

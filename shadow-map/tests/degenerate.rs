@@ -58,6 +58,17 @@ fn skipping_never_changes_the_image() {
     assert_eq!(images[0], images[1]);
 }
 
+/// A scene far from zero is shaded about as well as at zero: half as much again. `AliasFree` answers as shadow rays in the world do, and
+/// so does `Cascaded` under a light without a place; the spot is looked up in maps by all others.
+#[test]
+fn far_from_zero_shadows_stay() {
+    for variant in Variant::ALL.into_iter().filter(|&variant| variant != Variant::AliasFree) {
+        let error =
+            conformance::far_from_zero(&ShadowMap::new(ShadowMapParams { variant, ..Default::default() }));
+        assert!(error.there <= 1.5 * error.here, "{variant:?}: {error:?}");
+    }
+}
+
 /// Vertices are read from the second piece that they are bound in as from the first.
 #[cfg(feature = "gpu")]
 #[test]
