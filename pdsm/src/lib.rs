@@ -5,6 +5,7 @@ pub mod compression;
 pub mod cpu;
 pub mod crossings;
 pub mod emission;
+pub mod error_bound;
 pub mod events;
 pub mod functions;
 #[cfg(feature = "gpu")]

@@ -3,7 +3,8 @@
 use scene_core::technique::{Params, Preset, Setting, SettingKind};
 use serde::{Deserialize, Serialize};
 
-use crate::compression::{Compression, ErrorBound, Segments};
+use crate::compression::{Compression, Segments};
+use crate::error_bound::ErrorBound;
 
 /// How numbers of the functions are kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,7 +46,7 @@ pub struct PdsmParams {
     /// How far the compressed V may be from that of the maps; below 1/(2·`views`) compression saves little.
     pub max_error: f32,
     /// What `max_error` is measured by: V, or a picture's values, which show errors in the dark most
-    /// ([`ErrorBound`](crate::compression::ErrorBound)).
+    /// ([`ErrorBound`](crate::error_bound::ErrorBound)).
     pub error_measure: ErrorMeasure,
     /// Which segments the functions consist of: `fewest` takes longer to build and gives shorter ones, as files should hold.
     pub segments: Segments,
