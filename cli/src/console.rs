@@ -104,6 +104,12 @@ impl Progress {
         }
     }
 
+    /// Names what is done now.
+    pub(crate) fn at(&self, what: impl Into<String>) {
+        self.0.set_message(what.into());
+        self.0.tick();
+    }
+
     /// Lets `print` write to the terminal, the bar out of its way.
     pub(crate) fn above<T>(&self, print: impl FnOnce() -> T) -> T {
         self.0.suspend(print)

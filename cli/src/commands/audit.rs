@@ -74,6 +74,7 @@ pub(crate) fn run(args: &AuditArgs, console: &Console) -> Result<(), CliError> {
         for (done, pair) in pairs.iter().enumerate() {
             let sides = backend::sides(pair.on.as_ref(), &args.backend, gpu.is_some());
             for side in sides.into_iter().filter_map(|(_, side)| side) {
+                bar.at(format!("{} ({}) on {name}", pair.label, side.name()));
                 if let Some(cell) = cell(&mut stand, pair, side, args.runs, name)? {
                     if cells.is_empty() {
                         bar.above(|| console.row(&columns.headings()))?;

@@ -58,6 +58,7 @@ pub(crate) fn run(args: &StressArgs, console: &Console) -> Result<(), CliError> 
         for chosen in &chosen {
             let sides = backend::sides(chosen.technique.as_ref(), &args.backend, gpu.is_some());
             for side in sides.into_iter().filter_map(|(_, side)| side) {
+                bar.at(format!("{} ({}) on {}", chosen.label, side.name(), trial.name));
                 let repeats = Repeats { runs: 1, budget_ms: 0.0 };
                 let key = |trial: &str| (trial.to_owned(), chosen.label.clone(), side.name());
                 let base = trial.same_as.as_ref().and_then(|base| base_rmse.get(&key(base)).copied());
