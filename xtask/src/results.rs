@@ -10,7 +10,7 @@
 //!
 //! `gnomon …` is the command of this workspace, `example PACKAGE NAME …` an example of a crate, `bench PACKAGE NAME …` a bench, `copy FROM
 //! TO` a file that an earlier block left. Blocks run in the order of the page; with words only those whose line holds one of them. A
-//! page is written once all of its blocks are done. Times in it are those of the machine it ran on.
+//! page is written after each: all of them take hours. Times in it are those of the machine it ran on.
 
 use std::fs;
 use std::time::Instant;
@@ -32,7 +32,7 @@ pub(crate) fn run(words: &[String]) -> Result<(), CheckError> {
         let path = root().join(page);
         let text =
             fs::read_to_string(&path).map_err(|source| CheckError::Read { path: path.clone(), source })?;
-        let made = remade(&text, page, |line| {
+        let print = |line: &str| {
             let is_wanted = words.is_empty() || words.iter().any(|word| line.contains(word));
             if !is_wanted {
                 return Ok(None);
@@ -42,20 +42,21 @@ pub(crate) fn run(words: &[String]) -> Result<(), CheckError> {
             let printed = printed(line)?;
             eprintln!("    {:.1} s", start.elapsed().as_secs_f64());
             Ok(Some(printed))
-        })?;
-        if made != text {
-            fs::write(&path, made).map_err(|source| CheckError::Write { path, source })?;
-            eprintln!("==> wrote {page}");
-        }
+        };
+        let write = |page: &str| {
+            fs::write(&path, page).map_err(|source| CheckError::Write { path: path.clone(), source })
+        };
+        remade(&text, page, print, write)?;
     }
     Ok(())
 }
 
-/// The page with every block replaced by what `print` says, where it says something.
+/// The page with every block replaced by what `print` says, where it says something; `write` gets it after each of them.
 fn remade(
     page: &str,
     name: &str,
     mut print: impl FnMut(&str) -> Result<Option<String>, CheckError>,
+    mut write: impl FnMut(&str) -> Result<(), CheckError>,
 ) -> Result<String, CheckError> {
     let mut made = String::new();
     let mut rest = page;
@@ -68,7 +69,9 @@ fn remade(
         let end = block.find(END).ok_or_else(|| fault("no <!-- end -->"))?;
         let (line, head) = (&block[BEGIN.len()..close], &block[..close + CLOSE.len()]);
         made.push_str(&rest[..begin]);
-        match print(line)? {
+        let printed = print(line)?;
+        let is_new = printed.is_some();
+        match printed {
             None => made.push_str(&block[..end]),
             // Nothing printed: the block stands for what it leaves behind.
             Some(printed) if printed.trim().is_empty() => made.push_str(&format!("{head}\n")),
@@ -76,6 +79,9 @@ fn remade(
         }
         made.push_str(END);
         rest = &block[end + END.len()..];
+        if is_new {
+            write(&format!("{made}{rest}"))?;
+        }
     }
     made.push_str(rest);
     Ok(made)
@@ -128,17 +134,41 @@ mod tests {
     const PAGE: &str =
         "a\n<!-- run: gnomon x -->\nold\n<!-- end -->\nb\n<!-- run: copy p q -->\n<!-- end -->\n";
 
+    fn kept(_: &str) -> Result<(), CheckError> {
+        Ok(())
+    }
+
     #[test]
     fn blocks_are_replaced_and_all_else_is_kept() {
-        let made =
-            remade(PAGE, "page", |line| Ok(Some(if line == "gnomon x" { "new \n" } else { "" }.to_owned())));
+        let new = |line: &str| Ok(Some(if line == "gnomon x" { "new \n" } else { "" }.to_owned()));
+        let mut written = Vec::new();
+        let made = remade(PAGE, "page", new, |page| {
+            written.push(page.to_owned());
+            Ok(())
+        });
         let expected = "a\n<!-- run: gnomon x -->\n\n```text\nnew\n```\n\n<!-- end -->\nb\n<!-- run: copy p q -->\n<!-- end -->\n";
         assert_eq!(made.unwrap(), expected);
-        assert_eq!(remade(PAGE, "page", |_| Ok(None)).unwrap(), PAGE);
+        // After the first block all is there, the rest as it was.
+        assert_eq!(written, [expected, expected]);
+        assert_eq!(remade(PAGE, "page", |_| Ok(None), kept).unwrap(), PAGE);
         // A second time changes nothing.
-        let again =
-            remade(expected, "page", |line| Ok(Some(if line == "gnomon x" { "new" } else { "" }.to_owned())));
-        assert_eq!(again.unwrap(), expected);
+        assert_eq!(remade(expected, "page", new, kept).unwrap(), expected);
+    }
+
+    #[test]
+    fn what_is_done_is_written_before_the_rest_fails() {
+        let print = |line: &str| match line {
+            "gnomon x" => Ok(Some("new".to_owned())),
+            _ => Err(CheckError::Failed("no p".to_owned())),
+        };
+        let mut written = Vec::new();
+        let made = remade(PAGE, "page", print, |page| {
+            written.push(page.to_owned());
+            Ok(())
+        });
+        assert!(made.is_err());
+        assert_eq!(written.len(), 1);
+        assert!(written[0].contains("new") && written[0].ends_with("<!-- run: copy p q -->\n<!-- end -->\n"));
     }
 
     #[test]
@@ -148,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_block_without_end_is_named() {
-        let error = remade("<!-- run: gnomon x -->\n", "page", |_| Ok(None)).unwrap_err();
+        let error = remade("<!-- run: gnomon x -->\n", "page", |_| Ok(None), kept).unwrap_err();
         assert!(error.to_string().contains("gnomon x"), "{error}");
     }
 
@@ -157,11 +187,11 @@ mod tests {
         for page in PAGES {
             let text = fs::read_to_string(root().join(page)).unwrap();
             let mut lines = Vec::new();
-            remade(&text, page, |line| {
+            let line = |line: &str| {
                 lines.push(line.to_owned());
                 Ok(None)
-            })
-            .unwrap();
+            };
+            remade(&text, page, line, kept).unwrap();
             let known = ["gnomon ", "example ", "bench ", "copy ", "machine"];
             assert!(
                 lines.iter().all(|line| known.iter().any(|word| line.starts_with(word))),
