@@ -153,7 +153,7 @@ fn scenes_are_built_within_their_time() {
 #[test]
 fn sizes_follow_their_parameters() {
     let triangles = |spec: &str| setup(spec, 0.0).scene.triangles().len();
-    for budget in [20_000, 123_456, 2_500_000] {
+    for budget in [1_000, 7_000, 20_000, 123_456, 2_500_000] {
         let found = triangles(&format!("forest:triangles={budget}"));
         assert!(found <= budget && budget - found < 60, "{found} of {budget}");
     }

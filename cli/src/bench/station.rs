@@ -141,4 +141,13 @@ mod tests {
         let names: std::collections::BTreeSet<_> = stations.iter().map(Station::name).collect();
         assert_eq!(names.len(), stations.len());
     }
+
+    #[test]
+    fn forests_of_the_curve_can_be_built() {
+        let forest = scene_core::scenes::all().iter().find(|scene| scene.name == "forest").unwrap();
+        let triangles = forest.parameters.iter().find(|parameter| parameter.name == "triangles").unwrap();
+        for &value in Axis::Triangles.values() {
+            assert!((triangles.min..=triangles.max).contains(&value), "{value}");
+        }
+    }
 }

@@ -17,7 +17,7 @@ pub(super) const SCENE: BuiltIn = BuiltIn {
         Parameter::whole(
             "triangles",
             1_000_000,
-            [20_000, 20_000_000],
+            [1_000, 20_000_000],
             "triangles in all; what is left over is less than a tuft of grass",
         ),
         Parameter::whole(
@@ -33,8 +33,10 @@ pub(super) const SCENE: BuiltIn = BuiltIn {
     build,
 };
 
-/// Squares of the ground a side.
+/// Squares of the ground a side, at most.
 const GROUND: u32 = 64;
+/// Triangles of a forest that has them; a smaller one has as large a part of its triangles in its ground.
+const WHOLE_GROUND: f32 = 20_000.0;
 /// Radius of the clearing, in metres.
 const CLEARING: f32 = 7.0;
 
@@ -72,7 +74,8 @@ fn build(values: &Values<'_>, _time: f32) -> Stage {
     let density: f32 =
         species.iter().map(|s| s.variants[0].triangles.len() as f32 / (s.spacing * s.spacing)).sum();
     let radius = (1.8 * budget as f32 / density / std::f32::consts::PI).sqrt() + 2.0 * CLEARING;
-    let ground = ground(radius);
+    let squares = GROUND.min((GROUND as f32 * (budget as f32 / WHOLE_GROUND).sqrt()) as u32);
+    let ground = ground(radius, squares);
     let mut left = budget - ground.triangles.len();
     stage.add("ground", ground);
 
@@ -156,15 +159,15 @@ fn height(p: Vec2) -> f32 {
     2.0 * level * ((0.13 * p.x).sin() * (0.11 * p.y + 0.5).cos() + 0.4 * (0.05 * p.y).sin())
 }
 
-fn ground(radius: f32) -> TriangleMesh {
+fn ground(radius: f32, squares: u32) -> TriangleMesh {
     let at = |i: u32, j: u32| {
-        let p = (Vec2::new(i as f32, j as f32) / GROUND as f32 * 2.0 - 1.0) * (radius * 1.1);
+        let p = (Vec2::new(i as f32, j as f32) / squares as f32 * 2.0 - 1.0) * (radius * 1.1);
         Vec3::new(p.x, height(p), p.y)
     };
-    let positions = (0..=GROUND).flat_map(|j| (0..=GROUND).map(move |i| at(i, j))).collect();
-    let triangles = (0..GROUND)
-        .flat_map(|j| (0..GROUND).map(move |i| j * (GROUND + 1) + i))
-        .flat_map(|a| [[a, a + GROUND + 1, a + 1], [a + 1, a + GROUND + 1, a + GROUND + 2]])
+    let positions = (0..=squares).flat_map(|j| (0..=squares).map(move |i| at(i, j))).collect();
+    let triangles = (0..squares)
+        .flat_map(|j| (0..squares).map(move |i| j * (squares + 1) + i))
+        .flat_map(|a| [[a, a + squares + 1, a + 1], [a + 1, a + squares + 1, a + squares + 2]])
         .collect();
     TriangleMesh::new("", positions, triangles)
 }
