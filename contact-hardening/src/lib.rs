@@ -127,7 +127,7 @@ impl ContactHardening {
             skip: self.params.skip,
             ..Default::default()
         };
-        let maps = LightMaps::draw_near(query.scene, query.light, &settings, &mut report, |_, _, _| None);
+        let maps = LightMaps::draw_near(query.scene, query.light, &settings, &mut report);
         let (prepared, rest) = self.prepare_with(maps, query)?;
         report.merge_beside(&rest);
         Ok((prepared, report))

@@ -152,7 +152,7 @@ impl ShadowMap {
     ) -> (PreparedShadowMap<'a>, Report) {
         let (mut report, params) = (Report::default(), &self.params);
         let over_maps = |report: &mut Report| {
-            let maps = LightMaps::draw_near(scene, light, params, report, choose);
+            let maps = LightMaps::draw_near_for(scene, light, params, report, choose);
             (maps.origin, self.over(maps, report))
         };
         let (origin, variant): (Origin, Box<dyn PreparedVariant + 'a>) = match params.variant {

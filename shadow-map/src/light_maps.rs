@@ -149,8 +149,13 @@ impl<'a> LightMaps<'a> {
     }
 
     /// The same in coordinates counted [from the scene](Origin::near) if it lies far from zero. What is asked has to be
-    /// counted from [`origin`](Self::origin), too. `choose`, whose bounds are of the world, is then not asked.
-    pub fn draw_near(
+    /// counted from [`origin`](Self::origin), too.
+    pub fn draw_near(scene: &'a Scene, light: &Light, params: &ShadowMapParams, report: &mut Report) -> Self {
+        Self::draw_near_for(scene, light, params, report, |_, _, _| None)
+    }
+
+    /// [`draw_near`](Self::draw_near) of what `choose` leaves. Its bounds are of the world: where the scene moves it is not asked.
+    pub(crate) fn draw_near_for(
         scene: &'a Scene,
         light: &Light,
         params: &ShadowMapParams,
