@@ -95,8 +95,12 @@ fn check(spec: &str, views: u64) {
         let magnitude = scene.bounds().magnitude().max(camera.eye.abs().max_element());
         // Two kinds of light a view; all of them come up.
         for light in lights.iter().cycle().skip(seed as usize * 2 % lights.len()).take(2) {
-            let regions =
-                [CasterRegion::of(&scene, &camera, light), CasterRegion::of_receivers(&scene, &tiles, light)];
+            let closely = Receivers::seen_closely_by(&scene, &camera, light, &chunks);
+            let regions = [
+                CasterRegion::of(&scene, &camera, light),
+                CasterRegion::of_receivers(&scene, &tiles, light),
+                CasterRegion::between(&scene, &closely, light),
+            ];
             for region in regions {
                 let casters = relevant_casters(&scene, &region, &chunks, |_| true);
                 assert_eq!(casters.triangles_kept + casters.triangles_culled, scene.caster_count());
@@ -123,6 +127,37 @@ fn check(spec: &str, views: u64) {
         }
     }
     assert!(culled > 0 && blocked > 0, "{spec}: {culled} triangles left out, {blocked} rays blocked");
+}
+
+/// Looked at closely, what is seen is no looser than by objects' boxes, sometimes tighter, and holds every seen point.
+#[test]
+fn what_is_seen_closely_holds_every_seen_point() {
+    for spec in ["street", "forest:triangles=20000"] {
+        let scene = scenes::build(spec, 1.0).expect("a built-in scene").scene;
+        let (mut tighter, mut held) = (0, 0);
+        for seed in 0..20 {
+            let (camera, lights) = random_view(&scene, seed);
+            let gbuffer = raster::render_gbuffer(&scene, &camera);
+            let light = &lights[seed as usize % lights.len()];
+            let loose = Receivers::seen_by(&scene, &camera, light).region().bounds();
+            for chunks in [CasterChunks::new(&scene), CasterChunks::default()] {
+                let receivers = Receivers::seen_closely_by(&scene, &camera, light, &chunks);
+                let close = receivers.region().bounds();
+                assert!(close.is_empty() || loose.holds(&close), "{spec} {seed}: {close:?} in {loose:?}");
+                tighter += usize::from(close.size().cmplt(loose.size()).any());
+                let receives = |p: usize| scene.objects()[gbuffer.object[p] as usize].flags.receives;
+                for pixel in (0..gbuffer.pixel_count()).filter(|&p| gbuffer.is_seen(p) && receives(p)) {
+                    let position = gbuffer.position[pixel];
+                    if light.reaches(position) {
+                        held += 1;
+                        let point = Aabb { min: position, max: position };
+                        assert!(receivers.touches(&point), "{spec} {seed} {light:?}: {position}");
+                    }
+                }
+            }
+        }
+        assert!(tighter > 0 && held > 10_000, "{spec}: {tighter} tighter, {held} points");
+    }
 }
 
 /// Points along a shadow ray lie in the region as long as they lie in the casters' bounds.

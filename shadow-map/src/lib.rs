@@ -113,7 +113,7 @@ impl ShadowMap {
             let reach = Reach::of(&self.params, light).filter(|_| self.params.skip)?;
             report.time("prepare.relevance", |report| {
                 let map_size = self.params.map_size;
-                let receivers = Receivers::seen_closely_by(scene, camera, light);
+                let receivers = Receivers::seen_closely_by(scene, camera, light, chunks);
                 let seen = Seen { scene, light, receivers, casters, chunks, map_size, sine: OnceCell::new() };
                 let needs = views.iter().map(|view| seen.needs(view, views.len() > 1, reach));
                 let kept = needs.collect::<Option<Vec<_>>>()?;

@@ -37,6 +37,17 @@ impl Aabb {
         !(self.min.cmple(self.max).all())
     }
 
+    /// What both hold.
+    #[must_use]
+    pub fn intersection(self, other: Self) -> Self {
+        Self { min: self.min.max(other.min), max: self.max.min(other.max) }
+    }
+
+    /// Whether all of `other` lies in this box. An empty one does.
+    pub fn holds(&self, other: &Self) -> bool {
+        other.is_empty() || (self.min.cmple(other.min) & other.max.cmple(self.max)).all()
+    }
+
     /// The middle of the box; NaN for an empty one.
     pub fn center(&self) -> Vec3 {
         self.min * 0.5 + self.max * 0.5
@@ -81,6 +92,16 @@ mod tests {
         assert!(Aabb::EMPTY.is_empty() && !unit.is_empty());
         assert_eq!(Aabb::EMPTY.diagonal(), 0.0);
         assert_eq!(Aabb::EMPTY.magnitude(), 0.0);
+    }
+
+    #[test]
+    fn a_box_holds_what_it_has_in_common_with_another() {
+        let [a, b] = [Vec3::ZERO, Vec3::new(1.0, -1.0, 0.5)].map(|at| Aabb { min: at, max: at + 2.0 });
+        let both = a.intersection(b);
+        assert_eq!(both, Aabb { min: Vec3::new(1.0, 0.0, 0.5), max: Vec3::new(2.0, 1.0, 2.0) });
+        assert!(a.holds(&both) && b.holds(&both) && a.holds(&a) && !a.holds(&b));
+        let apart = Aabb { min: Vec3::splat(5.0), max: Vec3::splat(6.0) };
+        assert!(a.intersection(apart).is_empty() && a.holds(&a.intersection(apart)));
     }
 
     #[test]

@@ -62,6 +62,23 @@ impl HalfSpace {
     }
 }
 
+/// Where a box lies to what is inside of all `planes`; an empty box is outside.
+#[inline]
+pub(super) fn side_of_all(planes: &[HalfSpace], bounds: &Aabb) -> Side {
+    if bounds.is_empty() {
+        return Side::Outside;
+    }
+    let mut all = Side::Inside;
+    for plane in planes {
+        match plane.side_of(bounds) {
+            Side::Outside => return Side::Outside,
+            Side::Across => all = Side::Across,
+            Side::Inside => {}
+        }
+    }
+    all
+}
+
 /// A face: its plane, and its corners counter-clockwise as seen from outside.
 #[derive(Clone, Debug)]
 struct Face {
@@ -161,6 +178,12 @@ impl Polyhedron {
     /// Lower and upper corner of the smallest box around it; `None` if it is empty.
     pub fn extent(&self) -> Option<(DVec3, DVec3)> {
         self.vertices().map(|v| (v, v)).reduce(|(min, max), (v, _)| (min.min(v), max.max(v)))
+    }
+
+    /// The box around it, rounded to f32; empty for an empty one.
+    pub fn bounds(&self) -> Aabb {
+        let boxed = |(min, max): (DVec3, DVec3)| Aabb { min: min.as_vec3(), max: max.as_vec3() };
+        self.extent().map_or(Aabb::EMPTY, boxed)
     }
 
     /// Whether a box may have a point in common with it: no plane of a face or side of the box tells them apart.

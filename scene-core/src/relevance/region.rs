@@ -10,6 +10,7 @@ use std::iter;
 use glam::DVec3;
 
 use super::extent::LightExtent;
+use super::polyhedron::side_of_all;
 use super::{HalfSpace, Polyhedron, Receivers, Side};
 use crate::geometry::Aabb;
 use crate::light::LightPoint;
@@ -84,18 +85,7 @@ impl CasterRegion {
     /// Where a box lies: outside, across the border (or so close that it was not told), or inside.
     #[inline]
     pub fn side_of(&self, bounds: &Aabb) -> Side {
-        if self.hull.is_empty() || bounds.is_empty() {
-            return Side::Outside;
-        }
-        let mut side = Side::Inside;
-        for plane in &self.planes {
-            match plane.side_of(bounds) {
-                Side::Outside => return Side::Outside,
-                Side::Across => side = Side::Across,
-                Side::Inside => {}
-            }
-        }
-        side
+        if self.hull.is_empty() { Side::Outside } else { side_of_all(&self.planes, bounds) }
     }
 
     /// Whether no caster matters at all.

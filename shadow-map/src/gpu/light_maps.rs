@@ -5,7 +5,7 @@ use std::ops::Range;
 use scene_core::gpu::{
     Bound, DepthIds, DepthLayers, DepthPass, GpuError, GpuObject, GpuScene, HeldBuffer, Recorder,
 };
-use scene_core::relevance::{self, CasterRegion, Receivers};
+use scene_core::relevance::{self, CasterChunks, CasterRegion, Receivers};
 use scene_core::{Camera, Light, Report, Scene};
 
 use super::filter_maps::LevelTable;
@@ -109,8 +109,11 @@ impl LightMapsOnGpu {
         let of_views = camera.and_then(|camera| {
             // Of a box nothing is known but that the object lies within.
             let is_whole = scene.geometry.is_some();
-            let seen_by = if is_whole { Receivers::seen_closely_by } else { Receivers::seen_by };
-            let receivers = seen_by(&geometry, camera, light);
+            let receivers = if is_whole {
+                Receivers::seen_closely_by(&geometry, camera, light, &CasterChunks::default())
+            } else {
+                Receivers::seen_by(&geometry, camera, light)
+            };
             self.of_views((&geometry, is_whole), light, &receivers, &views, &drawn, report)
         });
         let casters = drawn.into_iter().map(|object| object.triangles.clone()).collect();
