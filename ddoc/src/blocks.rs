@@ -2,7 +2,7 @@
 //!
 //! A tile of the light's image holds receivers at many depths, with edges and faces for all of them. Its receivers are cut into
 //! blocks of neighbours, and each block chooses from the edges and faces of the one that it is a part of those that reach
-//! into its beam ([`beam`](crate::beam)), until few are left. Then
+//! into its beam ([`beam`](crate::beam)), until few are left, or the last choice left out too few to pay for another. Then
 //!
 //! - a block that no edge reaches has no penumbra: with no face before any of its receivers, or one before all, it is answered
 //!   as a whole, or else by faces alone, the hard test;
@@ -28,8 +28,8 @@ use crate::params::Variant;
 use crate::tile_edges::TileEdges;
 use crate::{PreparedDdoc, paper};
 
-/// Receivers of a block that is not cut again: to choose edges costs as much as asking some receivers about all of them.
-const FEW_RECEIVERS: usize = 8;
+/// Receivers of a block that is not cut again: to choose edges costs as much as asking so many receivers about all of them.
+pub(crate) const FEW_RECEIVERS: usize = 8;
 
 /// Receivers of a block with edges at most.
 const MOST_RECEIVERS: usize = 64;
@@ -153,7 +153,8 @@ fn shade_blocks<S: Simd>(simd: S, tile: &Tile<'_, '_>, thread: &mut Thread, valu
         if let Some(hull) = &prepared.hull {
             to_light = Beam::new(simd, &bounds, hull, origin);
         }
-        if let Some(hull) = &prepared.center_hull {
+        let has_faces = part_of.is_none_or(|whole| thread.chosen[whole].1.len() > 0);
+        if let Some(hull) = prepared.center_hull.as_ref().filter(|_| has_faces) {
             to_center = Beam::new(simd, &bounds, hull, origin);
         }
         // Those of a part lie one place above those of the whole.
@@ -163,7 +164,9 @@ fn shade_blocks<S: Simd>(simd: S, tile: &Tile<'_, '_>, thread: &mut Thread, valu
         }
         let (below, above) = thread.chosen.split_at_mut(place);
         let (edges, faces) = &mut above[0];
+        let mut of_whole = None;
         if let Some((edges_below, faces_below)) = below.last() {
+            of_whole = Some(edges_below.len() + faces_below.len());
             edges.take_within(simd, edges_below, to_light.as_ref(), Vec3::ZERO);
             faces.take_within(simd, faces_below, to_center.as_ref(), origin);
         } else {
@@ -185,8 +188,10 @@ fn shade_blocks<S: Simd>(simd: S, tile: &Tile<'_, '_>, thread: &mut Thread, valu
             || edges.len() <= FEW_EDGES
                 && faces.len() <= FEW_FACES
                 && (edges.len() == 0 || held.len() <= MOST_RECEIVERS);
+        let is_settled = held.len() <= MOST_RECEIVERS
+            && of_whole.is_some_and(|whole| costs_more(held.len(), whole, edges.len() + faces.len()));
         // Without a beam no part has less than the whole.
-        if !is_small && to_light.is_some() {
+        if !is_small && !is_settled && to_light.is_some() {
             let (middle, axis) = (held.len() / 2, bounds.size().max_position());
             held.select_nth_unstable_by(middle, |(_, a), (_, b)| a.point[axis].total_cmp(&b.point[axis]));
             let middle = receivers.start + middle;
@@ -225,6 +230,13 @@ fn shade_blocks<S: Simd>(simd: S, tile: &Tile<'_, '_>, thread: &mut Thread, valu
             values[slot as usize] = tile.answer(simd, &receiver, (&site, cone), at_center, thread);
         }
     }
+}
+
+/// Whether to choose again, for the parts of a block, costs more than it saves: asking all of its receivers about those that are
+/// left out then. They are taken to be the share that was left out last, when of the `whole` block's edges and faces `kept`
+/// were chosen: the smaller blocks are beside the penumbra's width, the less sets them apart.
+fn costs_more(receivers: usize, whole: usize, kept: usize) -> bool {
+    receivers * (whole - kept) <= FEW_RECEIVERS * whole
 }
 
 /// The box around receivers, relative to the origin. A difference rounded is the least where the number was.

@@ -11,9 +11,9 @@ use scene_core::raster::{DepthOptions, Fragments, RasterScratch, render_fragment
 use scene_core::{Light, Report, Scene};
 
 use crate::PreparedDdoc;
-use crate::blocks::{Thread, Tile, shade_tile};
+use crate::blocks::{FEW_RECEIVERS, Thread, Tile, shade_tile};
 use crate::coverage::Site;
-use crate::distortion_map::{Farthest, distortion_map};
+use crate::distortion_map::{FEW_TILES, Farthest, distortion_map};
 #[cfg(feature = "gpu")]
 use crate::grid::Grid;
 use crate::grid::TileLists;
@@ -21,7 +21,7 @@ use crate::layers::{Layers, Placed};
 use crate::light_image::LightImage;
 use crate::params::Variant;
 use crate::silhouettes::Edge;
-use crate::tiles::Tiles;
+use crate::tiles::{TileReceivers, Tiles};
 
 /// `prepare.map`: every face of `casters` over every texel's centre, a view each.
 pub fn draw_layers(
@@ -54,7 +54,7 @@ pub fn shade(
     let images: Vec<LightImage> = prepared.layers.iter().map(|layers| layers.image).collect();
     let lone = images.len() == 1;
     let tiles = report.time("shade.receivers", |_| Tiles::new(&images, lone, values, &site));
-    let maps = report.time("shade.splat", |_| splats(prepared, &tiles.farthest));
+    let maps = report.time("shade.splat", |_| splats(prepared, &tiles.farthest, FEW_TILES));
     if prepared.skip {
         report.skip("splats", maps.iter().map(|map| map.left_out).sum());
     }
@@ -62,8 +62,8 @@ pub fn shade(
     report.time("shade.penumbra", |report| penumbra(prepared, &tiles, &maps, values, report, &site));
 }
 
-/// `shade.splat`: the splats of each view, over receivers as far as these.
-fn splats(prepared: &PreparedDdoc<'_>, farthest: &[Farthest]) -> Vec<TileLists> {
+/// `shade.splat`: the splats of each view, over receivers as far as these; those over a `few` tiles are not cut.
+fn splats(prepared: &PreparedDdoc<'_>, farthest: &[Farthest], few: u32) -> Vec<TileLists> {
     let (edges, origin) = (&prepared.edges, prepared.origin);
     // A light without extent has no penumbrae: no receiver asks for an edge.
     let is_asked = !prepared.skip || prepared.base.light.is_extended();
@@ -74,7 +74,7 @@ fn splats(prepared: &PreparedDdoc<'_>, farthest: &[Farthest]) -> Vec<TileLists> 
             let is_paper = prepared.variant == Variant::Paper;
             is_paper.then(|| image.along(edges[edge].far + origin))
         };
-        let (hull, skip) = (prepared.hull.as_ref(), prepared.skip);
+        let (hull, skip) = (prepared.hull.as_ref(), prepared.skip.then_some(few));
         distortion_map(image, &ends, &reach, if is_asked { edges.len() } else { 0 }, hull, farthest, skip)
     };
     prepared.layers.iter().zip(farthest).map(splat).collect()
@@ -89,7 +89,8 @@ pub(crate) fn splats_for_any_camera(prepared: &PreparedDdoc<'_>) -> Vec<TileList
         Farthest::of_scene(prepared.base.scene.as_ref(), &layers.image, grid)
     };
     let farthest: Vec<_> = prepared.layers.iter().map(of_scene).collect();
-    splats(prepared, &farthest)
+    // These lists are gone through every frame, by every pixel: any cut pays.
+    splats(prepared, &farthest, 1)
 }
 
 /// `shade.penumbra`: all receivers, tile by tile.
@@ -101,17 +102,19 @@ fn penumbra(
     report: &mut Report,
     site: &(impl Fn(usize) -> Result<Receiver, f32> + Sync),
 ) {
-    // Edges are looked up once for many receivers where each block of them then chooses its own.
+    // Edges are looked up once for many receivers where each block of them then chooses its own; not for so many that blocks
+    // would be cut below the finest tiles all over, which have their edges listed.
     let is_chosen = prepared.skip && prepared.variant != Variant::Paper;
     let level = if is_chosen { maps.first().map_or(0, |map| (map.grid().levels() - 1).min(1)) } else { 0 };
-    let (sorted, ranges) = tiles.sorted(level);
+    let (sorted, ranges) = tiles.sorted(level, 2 * FEW_RECEIVERS);
     let simd_level = Level::new();
     let without_edge = AtomicU64::new(0);
     let parts: Vec<Vec<f32>> = ranges
         .par_iter()
         .map_init(Thread::default, |thread, tile| {
             let receivers = &sorted[tile.range.clone()];
-            let tile = Tile { prepared, view: tile.view, splats: &maps[tile.view], level, tile: tile.tile };
+            let TileReceivers { view, level, tile, .. } = *tile;
+            let tile = Tile { prepared, view, splats: &maps[view], level, tile };
             let values = dispatch!(simd_level, simd => shade_tile(simd, &tile, receivers, thread, site));
             without_edge.fetch_add(std::mem::take(&mut thread.without_edge), Ordering::Relaxed);
             values

@@ -38,6 +38,14 @@ pub(crate) struct Range {
     pub(crate) last: [u32; 2],
 }
 
+impl Range {
+    /// How many tiles of the finest grid it lies over, those beside the border counted, too.
+    pub(crate) fn finest_tiles(&self) -> u32 {
+        let [columns, rows] = [0, 1].map(|axis| self.last[axis] - self.first[axis] + 1);
+        (columns * rows) << (2 * RATIO * self.level)
+    }
+}
+
 /// The grids' geometry: receivers beside the map count, too, as far as its own width; those beyond go to the border tiles.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid {
@@ -115,6 +123,21 @@ impl Grid {
 
     pub(crate) fn tiles_at(&self, level: u32) -> u32 {
         ((self.tiles - 1) >> (RATIO * level)) + 1
+    }
+
+    /// The tiles of the finest grid, those within one tile of the grid of `level` after the other; and where each of these begins
+    /// among them, and the last one ends.
+    pub(crate) fn finest_by(&self, level: u32) -> (Vec<u32>, Vec<u32>) {
+        let (side, width) = (self.tiles_at(level), 1 << (RATIO * level));
+        let within = |at: u32| at * width..((at + 1) * width).min(self.tiles);
+        let (mut order, mut starts) = (Vec::with_capacity(self.count()), vec![0]);
+        for (row, column) in (0..side).flat_map(|row| (0..side).map(move |column| (row, column))) {
+            for row in within(row) {
+                order.extend(within(column).map(|column| row * self.tiles + column));
+            }
+            starts.push(order.len() as u32);
+        }
+        (order, starts)
     }
 
     /// Where the tiles of a grid begin among all grids' tiles.

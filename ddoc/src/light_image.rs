@@ -124,6 +124,7 @@ impl LightImage {
 
     /// How fast the distance grows on the way that the shadow of `point` takes from the light's point `from`: the cosine
     /// between the two. `None` where the two points are one.
+    #[inline(always)]
     pub fn rate(&self, point: Vec3, from: LightPoint) -> Option<f64> {
         let axis = self.along.truncate().as_dvec3();
         Some(axis.try_normalize()?.dot(way_of_shadow(point, from).try_normalize()?))
@@ -131,6 +132,7 @@ impl LightImage {
 
     /// Where the shadow of an edge's point ends: what the light's point `from` throws from `point` to the distance `far`.
     /// `None` if it never gets there.
+    #[inline(always)]
     pub fn thrown(&self, point: Vec3, from: LightPoint, far: f32) -> Option<Vec3> {
         let direction = way_of_shadow(point, from);
         let rate = self.along.truncate().as_dvec3().dot(direction);

@@ -23,7 +23,7 @@ use crate::discontinuity::Discontinuities;
 use crate::image_edges::outline;
 use crate::light_image::LightImage;
 use crate::silhouettes::Edge;
-use crate::splat::splat;
+use crate::splat::Cast;
 
 /// The splats of a map, each as the edge it stands for: across its texel, the near side on the left, relative to `origin`.
 pub fn texel_splats(map: &Discontinuities<'_>, origin: Vec3, bounds: Aabb) -> Vec<Edge> {
@@ -107,7 +107,7 @@ pub fn visible<'e>(
         }
         // The receiver moved along its line to the light's centre, down to the far z.
         let far = image.along(edge.far + origin);
-        if !splat(image, ends, hull, far).is_some_and(|splat| splat.bounds.holds(place)) {
+        if !Cast::new(image, ends, hull).splat(far).is_some_and(|splat| splat.bounds.holds(place)) {
             continue;
         }
         let far_point = image.thrown(point, light.center(), far);

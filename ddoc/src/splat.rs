@@ -12,7 +12,7 @@
 //! everywhere.
 
 use glam::Vec3;
-use scene_core::light::LightHull;
+use scene_core::light::{LightHull, LightPoint};
 
 use crate::light_image::{Bounds, LightImage};
 
@@ -32,43 +32,62 @@ pub struct Splat {
     pub beyond: f32,
 }
 
-/// The splat of an edge for receivers up to the distance `far`; `None` if all of them lie before it. Everything where the
-/// shadow comes back or reaches behind the light's plane.
-pub fn splat(image: &LightImage, ends: [Vec3; 2], hull: Option<&LightHull>, far: f32) -> Option<Splat> {
-    let back_too = Splat { bounds: Bounds::ALL, beyond: f32::NEG_INFINITY };
-    let Some(hull) = hull else { return Some(back_too) };
-    let rates =
-        ends.into_iter().flat_map(|end| hull.corners().iter().map(move |&corner| image.rate(end, corner)));
-    if rates.into_iter().any(|rate| rate.is_none_or(|rate| rate <= LEAST_RATE)) {
-        return Some(back_too);
+/// An edge as light falls past it: what its splats have in common, however far their receivers lie.
+#[derive(Clone, Copy, Debug)]
+pub struct Cast<'a> {
+    image: &'a LightImage,
+    ends: [Vec3; 2],
+    /// Bounds of the light; none where shadows come back.
+    hull: Option<&'a LightHull>,
+    beyond: f32,
+}
+
+impl<'a> Cast<'a> {
+    /// Of the edge between `ends`.
+    pub fn new(image: &'a LightImage, ends: [Vec3; 2], hull: Option<&'a LightHull>) -> Self {
+        let goes_on =
+            |end: Vec3, corner: LightPoint| image.rate(end, corner).is_some_and(|rate| rate > LEAST_RATE);
+        let hull = hull.filter(|hull| {
+            hull.corners().iter().all(|&corner| match corner {
+                LightPoint::At(_) => ends.into_iter().all(|end| goes_on(end, corner)),
+                // The same way from everywhere.
+                LightPoint::Towards(_) => goes_on(ends[0], corner),
+            })
+        });
+        let nearest = || image.along(ends[0]).min(image.along(ends[1]));
+        Self { image, ends, hull, beyond: if hull.is_some() { nearest() } else { f32::NEG_INFINITY } }
     }
-    let distances = ends.map(|end| image.along(end));
-    let beyond = distances[0].min(distances[1]);
-    if beyond >= far {
-        return None;
-    }
-    let everywhere = Splat { bounds: Bounds::ALL, beyond };
-    let mut bounds = Bounds::NONE;
-    for end in ends {
-        match image.place(end) {
-            Some(place) => bounds = bounds.with(place),
-            None => return Some(everywhere),
+
+    /// The splat for receivers up to the distance `far`; `None` if all of them lie before the edge. Everything where the shadow
+    /// comes back or reaches behind the light's plane.
+    pub fn splat(&self, far: f32) -> Option<Splat> {
+        let Self { image, ends, beyond, .. } = *self;
+        let everywhere = Splat { bounds: Bounds::ALL, beyond };
+        let Some(hull) = self.hull else { return Some(everywhere) };
+        if beyond >= far {
+            return None;
         }
-        for &corner in hull.corners() {
-            match image.thrown(end, corner, far).and_then(|thrown| image.place(thrown)) {
+        let mut bounds = Bounds::NONE;
+        for end in ends {
+            match image.place(end) {
                 Some(place) => bounds = bounds.with(place),
                 None => return Some(everywhere),
             }
+            for &corner in hull.corners() {
+                match image.thrown(end, corner, far).and_then(|thrown| image.place(thrown)) {
+                    Some(place) => bounds = bounds.with(place),
+                    None => return Some(everywhere),
+                }
+            }
         }
+        Some(Splat { bounds: bounds.grown(SLACK), beyond })
     }
-    Some(Splat { bounds: bounds.grown(SLACK), beyond })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use gnomon_shadow_map::light_views::light_views;
-    use scene_core::light::LightPoint;
     use scene_core::{Light, scenes};
 
     /// Every receiver that an edge lies before, as some point of the light sees it, is in the edge's splat: under lights as large as
@@ -119,7 +138,7 @@ mod tests {
                             continue;
                         };
                         let far = along + along.abs() * 1e-5;
-                        let found = splat(image, ends, Some(&hull), far);
+                        let found = Cast::new(image, ends, Some(&hull)).splat(far);
                         assert!(
                             found.is_some_and(|splat| splat.bounds.holds(place) && splat.beyond < far),
                             "{light:?}: {ends:?} before {receiver}: {found:?}"

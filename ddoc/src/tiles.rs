@@ -6,7 +6,7 @@ use gnomon_shadow_map::light_maps::Receiver;
 use rayon::prelude::*;
 
 use crate::distortion_map::Farthest;
-use crate::grid::{Grid, RATIO};
+use crate::grid::Grid;
 use crate::light_image::LightImage;
 
 /// Of what needs no tile.
@@ -31,7 +31,9 @@ pub struct Tiles {
 pub struct TileReceivers {
     /// The view.
     pub view: usize,
-    /// The tile of the grid that they are sorted by.
+    /// The grid that the tile is of.
+    pub level: u32,
+    /// The tile.
     pub tile: u32,
     /// Indices of receivers, where they begin and end among all that are sorted.
     pub range: std::ops::Range<usize>,
@@ -81,23 +83,19 @@ impl Tiles {
         Self { of, farthest, per_view, grid }
     }
 
-    /// The receivers that have a tile, sorted by tiles of the grid of `level`; in a tile in their own order.
-    pub fn sorted(&self, level: u32) -> (Vec<u32>, Vec<TileReceivers>) {
-        let (side, side_above) = (self.grid.tiles(), self.grid.tiles_at(level));
-        let per_view = side_above * side_above;
-        // Of each tile of the finest grid the one above it.
-        let above: Vec<u32> = (0..self.farthest.len() as u32 * self.per_view)
-            .map(|of| {
-                let (view, tile) = (of / self.per_view, of % self.per_view);
-                let [column, row] = [tile % side, tile / side].map(|at| at >> (RATIO * level));
-                view * per_view + row * side_above + column
-            })
-            .collect();
-        let tiles = self.farthest.len() * per_view as usize;
-        let counts: Vec<AtomicU32> = (0..=tiles).map(|_| AtomicU32::new(0)).collect();
-        let chosen = |of: u32| if of == NONE { NONE } else { above[of as usize] };
-        self.of.par_iter().map(|&of| chosen(of)).filter(|&of| of != NONE).for_each(|of| {
-            counts[of as usize + 1].fetch_add(1, Ordering::Relaxed);
+    /// The receivers that have a tile, sorted by tiles of the grid of `level`, within one by its finest tiles, and in those in their
+    /// own order. Where the finest hold more than `most` each, on average, they are tiles of their own.
+    pub fn sorted(&self, level: u32, most: usize) -> (Vec<u32>, Vec<TileReceivers>) {
+        let (views, tiles) = (self.farthest.len(), self.grid.tiles_at(level) * self.grid.tiles_at(level));
+        let (order, starts) = self.grid.finest_by(level);
+        // Of each of the finest tiles its place in this order.
+        let mut places = vec![0; order.len()];
+        order.iter().zip(0..).for_each(|(&tile, place)| places[tile as usize] = place);
+        let place = |of: u32| of / self.per_view * self.per_view + places[(of % self.per_view) as usize];
+        let counts: Vec<AtomicU32> =
+            (0..=views * self.per_view as usize).map(|_| AtomicU32::new(0)).collect();
+        self.of.par_iter().filter(|&&of| of != NONE).for_each(|&of| {
+            counts[place(of) as usize + 1].fetch_add(1, Ordering::Relaxed);
         });
         let mut first: Vec<u32> = counts.into_iter().map(AtomicU32::into_inner).collect();
         let mut sum = 0;
@@ -105,24 +103,71 @@ impl Tiles {
             sum += *count;
             *count = sum;
         }
-        let mut cursor = first.clone();
+        let range = |from: u32, to: u32| first[from as usize] as usize..first[to as usize] as usize;
+        let mut ranges = Vec::new();
+        for view in 0..views {
+            let base = view as u32 * self.per_view;
+            for tile in 0..tiles {
+                let [from, to] = [0, 1].map(|end| starts[(tile + end) as usize]);
+                let held = range(base + from, base + to);
+                if held.len() > most * (to - from) as usize {
+                    let finest = (from..to).map(|at| TileReceivers {
+                        view,
+                        level: 0,
+                        tile: order[at as usize],
+                        range: range(base + at, base + at + 1),
+                    });
+                    ranges.extend(finest.filter(|tile| !tile.range.is_empty()));
+                } else if !held.is_empty() {
+                    ranges.push(TileReceivers { view, level, tile, range: held });
+                }
+            }
+        }
         let mut sorted = vec![0; sum as usize];
-        for (index, &of) in self.of.iter().enumerate() {
-            let of = chosen(of);
+        for (&of, index) in self.of.iter().zip(0..) {
             if of != NONE {
-                let at = &mut cursor[of as usize];
-                sorted[*at as usize] = index as u32;
+                let at = &mut first[place(of) as usize];
+                sorted[*at as usize] = index;
                 *at += 1;
             }
         }
-        let ranges = (0..tiles)
-            .filter(|&tile| first[tile] < first[tile + 1])
-            .map(|tile| TileReceivers {
-                view: tile / per_view as usize,
-                tile: tile as u32 % per_view,
-                range: first[tile] as usize..first[tile + 1] as usize,
-            })
-            .collect();
         (sorted, ranges)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::RATIO;
+
+    /// Every receiver is in one range, of a tile that holds its own; full tiles are told apart, others are not.
+    #[test]
+    fn full_tiles_are_told_apart() {
+        let grid = Grid::new(64, true);
+        let (side, per_view) = (grid.tiles(), grid.count() as u32);
+        // A receiver on each of the finest tiles, and twenty more on each of the last row's.
+        let last_row = per_view - side..per_view;
+        let of: Vec<u32> =
+            (0..per_view).chain((0..20).flat_map(|_| last_row.clone())).chain([NONE]).collect();
+        let tiles = Tiles { of, farthest: vec![Farthest::new(grid)], per_view, grid };
+        let (sorted, ranges) = tiles.sorted(1, 3);
+        let mut found = sorted.clone();
+        found.sort_unstable();
+        assert!(found.into_iter().eq(0..tiles.of.len() as u32 - 1));
+        let mut next = 0;
+        for TileReceivers { view, level, tile, range } in ranges {
+            assert_eq!((view, range.start), (0, next));
+            next = range.end;
+            let side_of_level = grid.tiles_at(level);
+            let shift = RATIO * level;
+            for &receiver in &sorted[range] {
+                let at = tiles.of[receiver as usize];
+                let (column, row) = (at % side, at / side);
+                assert_eq!((row >> shift) * side_of_level + (column >> shift), tile);
+                let is_full = row >> RATIO == (side - 1) >> RATIO;
+                assert_eq!(level, u32::from(!is_full));
+            }
+        }
+        assert_eq!(next, sorted.len());
     }
 }

@@ -34,6 +34,21 @@ fn skipping_never_changes_the_image() {
     }
 }
 
+/// Tiles of few receivers and of many, splats over few tiles and over many: what is left out is chosen by how many there are.
+#[test]
+fn however_much_falls_on_a_tile() {
+    for scene in ["pool", "knot", "layers"] {
+        let mut setup = scenes::build(scene, 0.0).expect("built in");
+        (setup.camera.width, setup.camera.height) = (131, 97);
+        let gbuffer = raster::render_gbuffer(&setup.scene, &setup.camera);
+        for map_size in [16, 64, 512, 2048] {
+            let params = DdocParams { map_size, taps: 16, ..Default::default() };
+            let (differ, _) = differences(&setup.scene, &setup.lights[0], &gbuffer, params);
+            assert_eq!(differ, 0, "{scene}, {map_size} texels");
+        }
+    }
+}
+
 /// Every built-in scene under its own lights, and under every kind of light, from inside the scene, too.
 #[test]
 fn whatever_the_scene_and_the_light() {
