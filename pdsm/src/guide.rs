@@ -7,6 +7,8 @@
 //!
 //! It is made from index and nodes and is no part of a file.
 
+use std::hint::black_box;
+
 use rayon::prelude::*;
 
 use crate::nodes::{Node, Nodes};
@@ -120,6 +122,12 @@ impl Guide {
         (size_of_val(self.every.as_slice()) + size_of_val(self.starts.as_slice())) as u64
     }
 
+    /// See [`fetch`]: what [`group`](Self::group) reads first.
+    #[inline(always)]
+    pub(crate) fn fetch(&self, [start, _]: [u32; 2]) {
+        fetch(&self.every, start.div_ceil(GROUP as u32) as usize, AT_ONCE);
+    }
+
     /// The group that holds the last node that is not behind `t`, of a function whose nodes are `start` to `end` and are not
     /// none: if it has such a node.
     #[inline(always)]
@@ -139,6 +147,18 @@ impl Guide {
             }
         }
         entry.saturating_sub(1)
+    }
+}
+
+/// Reads the ends of a cache line's `count` values for a later loop, as they may lie in two. A loop of nothing else waits for as many
+/// reads at once as memory answers; one that goes on with what it reads fills the processor's window with a few rounds, and waits
+/// for those alone.
+#[inline(always)]
+pub(crate) fn fetch<T: Copy>(values: &[T], first: usize, count: usize) {
+    for place in [first, first + count - 1] {
+        if let Some(&value) = values.get(place) {
+            black_box(value);
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use super::places::Places;
 use super::{BATCH, Lanes};
 use crate::functions::Functions;
-use crate::guide::{Guide, RIM, evaluate_in};
+use crate::guide::{GROUP, Guide, RIM, evaluate_in, fetch};
 use crate::nodes::{Node, Nodes};
 
 /// V of those places that are read, interpolated between four functions, 1 of the others; how many lie before the start of
@@ -94,10 +94,17 @@ impl Reads<1> {
 /// A column or row as a number no farther than beside the PDSM: far beside it, where it is not read.
 #[inline(always)]
 fn beside(place: f32, is_read: bool, functions: &Functions) -> i32 {
-    // Clamped as floats, which saturate to no other side.
     let (low, high) = (-(RIM as f32), functions.size() as f32);
-    let clamped = if is_read { place.max(low).min(high) } else { low };
-    clamped as i32
+    whole(if is_read { place.max(low).min(high) } else { low })
+}
+
+/// 1.5 · 2²³: floats from 2²³ to 2²⁴ are whole numbers, and count up with their bits.
+const WHOLE: f32 = 12_582_912.0;
+
+/// A whole number of less than 2²² as an integer. A conversion that saturates is not done side by side.
+#[inline(always)]
+fn whole(number: f32) -> i32 {
+    (number + WHOLE).to_bits().wrapping_sub(WHOLE.to_bits()) as i32
 }
 
 impl<const N: usize> Reads<N> {
@@ -194,10 +201,16 @@ impl<const N: usize> Reads<N> {
         for ((k, i), range) in chosen.clone().zip(&mut *ranges) {
             *range = functions.range(self.columns[k] + (i % 2) as i32, self.rows[k] + (i / 2) as i32);
         }
+        for &range in ranges.iter().take(self.count) {
+            functions.guide().fetch(range);
+        }
         for (((k, i), &range), group) in chosen.clone().zip(&*ranges).zip(&mut *groups) {
             if range[0] < range[1] {
                 *group = functions.guide().group(range, self.depths[i][k]) as u32;
             }
+        }
+        for &group in groups.iter().take(self.count) {
+            fetch(nodes, GROUP * group as usize, GROUP);
         }
         for (((k, i), &range), &group) in chosen.zip(&*ranges).zip(&*groups) {
             if range[0] < range[1] {
