@@ -3,7 +3,7 @@
 //! Receivers are looked up [`BATCH`] at a time, stage by stage: where they lie on a window ([`places`]), which of them lie
 //! before the start of all their functions, where the others' nodes are ([`reads`]). What is arithmetic is done for a vector of
 //! them at once; what waits for memory does not depend on another such wait of its stage, so that the processor waits for
-//! many of them at once. V is what one lookup after the other gives, bit for bit.
+//! many of them at once, and is fetched by a loop that does nothing else. V is what one lookup after the other gives, bit for bit.
 
 mod places;
 mod reads;
