@@ -2,9 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
-use super::casters::{CHUNK, parts_of};
+use super::close_bounds::CloseBounds;
 use super::extent::{LightExtent, reach_of};
-use super::polyhedron::side_of_all;
 use super::{CasterChunks, HalfSpace, Polyhedron, Side, depth_slice, pyramid};
 use crate::geometry::Aabb;
 use crate::light::LightPoint;
@@ -17,15 +16,6 @@ use crate::{Camera, Light, Scene};
 /// ray is lifted by 8 u M ([`crate::bvh::shadow_origin`]); sampled points of a light are off by less than 4 u M.
 /// The sum is below 35 u M; 2⁻¹⁸ is 64 u.
 const MARGIN: f64 = 1.0 / 262_144.0;
-
-/// Triangles of an object that are asked one by one, at most, by [`Receivers::seen_closely_by`]: some 0.3 ms.
-pub const MOST_TRIANGLES: usize = 16_384;
-
-/// Triangles that mostly lie side by side, in an object's order.
-const NEIGHBOURS: usize = 16;
-
-/// The share of what is in view, along each axis, that is not worth a closer look.
-pub const LITTLE: f32 = 1.0 / 32.0;
 
 /// A convex polyhedron that holds all receivers that matter: the view's volume cut with the receivers' bounds,
 /// or given boxes; and with a spot's cone, outside of which nothing is asked.
@@ -53,60 +43,14 @@ impl Receivers {
     }
 
     /// As [`seen_by`](Self::seen_by), closer: of objects across the view's border only triangles that are not wholly outside of it
-    /// count, so that a ground that rises far away is as flat as it is where it is seen. An object of more than [`MOST_TRIANGLES`]
-    /// counts as a whole, and so does what could make the box around all receivers larger by no more than a [`LITTLE`] of what is
+    /// count, so that a ground that rises far away is as flat as it is where it is seen. An object of more than [`MOST_TRIANGLES`](super::MOST_TRIANGLES)
+    /// counts as a whole, and so does what could make the box around all receivers larger by no more than a [`LITTLE`](super::LITTLE) of what is
     /// in view. `chunks` must be of the same scene; objects it does not know are gone through without.
     pub fn seen_closely_by(scene: &Scene, camera: &Camera, light: &Light, chunks: &CasterChunks) -> Self {
         let margin = margin(scene.bounds(), camera.eye, light);
         let planes: Vec<_> = frustum(camera).into_iter().map(|plane| plane.grown(margin)).collect();
-        let wider: Vec<_> = planes.iter().map(|plane| plane.grown(margin)).collect();
-        let mut across = Vec::new();
-        let mut bounds = Aabb::EMPTY;
-        for ((id, object), side) in scene.objects().iter().enumerate().zip(chunks.sides(scene, &wider)) {
-            match side {
-                _ if !object.flags.receives => {}
-                Side::Outside => {}
-                Side::Across if object.triangles.len() <= MOST_TRIANGLES => across.push((id, object)),
-                Side::Across | Side::Inside => bounds = bounds.union(object.bounds),
-            }
-        }
-        let mut view = Polyhedron::from_box(scene.bounds(), margin);
-        planes.iter().for_each(|&plane| view.clip(plane));
-        let mut seen = CloseBounds::new(bounds, view.bounds());
-        // Far smaller than the box where the view's border is slanted; takes some microseconds.
-        let in_view = |bounds: Aabb| {
-            let mut part = Polyhedron::from_box(bounds, 0.0);
-            planes.iter().for_each(|&plane| part.clip(plane));
-            part.bounds()
-        };
-        for (id, object) in across {
-            if seen.takes(object.bounds) {
-                continue;
-            }
-            let part = if object.triangles.len() > CHUNK { in_view(object.bounds) } else { object.bounds };
-            let mut crossed = wider.clone();
-            crossed.retain(|plane| plane.side_of(&object.bounds) != Side::Inside);
-            let outside = |corners: &[Vec3; 3]| {
-                let beyond = |plane: &HalfSpace| corners.iter().all(|c| plane.height(c.as_dvec3()) > 0.0);
-                crossed.iter().any(beyond)
-            };
-            let is_outside = |bounds: &Aabb| side_of_all(&crossed, bounds) == Side::Outside;
-            for (run, run_bounds) in chunks.runs_of(id, object) {
-                if seen.takes(run_bounds.intersection(part)) || is_outside(&run_bounds) {
-                    continue;
-                }
-                for few in parts_of(run, NEIGHBOURS) {
-                    let corners = few.map(|triangle| scene.corners(triangle));
-                    let few_bounds = Aabb::from_points(corners.clone().flatten());
-                    if seen.takes(few_bounds.intersection(part)) || is_outside(&few_bounds) {
-                        continue;
-                    }
-                    let inside = corners.filter(|corners| !outside(corners)).flatten();
-                    seen.close = inside.fold(seen.close, Aabb::with_point);
-                }
-            }
-        }
-        let mut region = Polyhedron::from_box(seen.close.union(seen.beside), margin);
+        let bounds = CloseBounds::around(scene, &planes, margin, chunks);
+        let mut region = Polyhedron::from_box(bounds, margin);
         planes.into_iter().for_each(|plane| region.clip(plane));
         Self::reached(region, light, margin)
     }
@@ -170,33 +114,6 @@ impl Receivers {
     #[must_use]
     pub fn grown(&self, distance: f64) -> Self {
         Self { region: self.region.grown(distance), margin: self.margin }
-    }
-}
-
-/// The box around what is seen while it is gathered.
-struct CloseBounds {
-    /// Around what was looked at closely.
-    close: Aabb,
-    /// Around what was taken as a whole, being in that box or little beside it.
-    beside: Aabb,
-    /// Of all that can be in view.
-    view: Aabb,
-}
-
-impl CloseBounds {
-    fn new(close: Aabb, view: Aabb) -> Self {
-        Self { close, beside: Aabb::EMPTY, view }
-    }
-
-    /// Takes what of `part` is in view as a whole, if it adds little.
-    fn takes(&mut self, part: Aabb) -> bool {
-        let (part, little) = (part.intersection(self.view), LITTLE * self.view.size());
-        let near = Aabb { min: self.close.min - little, max: self.close.max + little };
-        let takes = near.holds(&part);
-        if takes && !part.is_empty() {
-            self.beside = self.beside.union(part);
-        }
-        takes
     }
 }
 
