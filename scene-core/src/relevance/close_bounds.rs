@@ -14,7 +14,7 @@ use crate::geometry::{Aabb, Object};
 pub const MOST_TRIANGLES: usize = 16_384;
 
 /// The share of what is in view, along each axis, that is not worth a closer look.
-pub const LITTLE: f32 = 1.0 / 32.0;
+pub const LITTLE: f32 = 1.0 / 16.0;
 
 /// Triangles that mostly lie side by side, in an object's order.
 const NEIGHBOURS: usize = 16;
