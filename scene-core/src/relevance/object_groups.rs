@@ -11,6 +11,8 @@ const GROUP: usize = 32;
 /// The objects of a scene that have triangles, by place: groups with the box around each.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ObjectGroups {
+    /// Objects of the scene when they were grouped: those below this id are in a group, or without triangles.
+    known: usize,
     groups: Vec<(Aabb, Vec<u32>)>,
 }
 
@@ -21,6 +23,7 @@ impl ObjectGroups {
         let ids = (0..).zip(objects).filter(|(_, object)| !object.bounds.is_empty());
         let mut ids: Vec<u32> = ids.map(|(id, _)| id).collect();
         if ids.len() > GROUP {
+            groups.known = objects.len();
             groups.split(scene, &mut ids);
         }
         groups
@@ -48,34 +51,47 @@ impl ObjectGroups {
         size_of_val(self.groups.as_slice()) + ids
     }
 
-    /// Where each object lies to what is inside of all `planes`, by id; one without triangles is outside.
+    /// Where each object lies to what is inside of all `planes`, by id; one without triangles is outside. Objects that are in no group
+    /// are asked one by one.
     pub(super) fn sides(&self, scene: &Scene, planes: &[HalfSpace]) -> Vec<Side> {
         let objects = scene.objects();
         let side_of = |bounds: &Aabb| side_of_all(planes, bounds);
-        if self.groups.is_empty() {
-            return objects.iter().map(|object| side_of(&object.bounds)).collect();
-        }
-        let mut sides = vec![Side::Outside; objects.len()];
+        let (known, others) = objects.split_at(self.known.min(objects.len()));
+        let mut sides = vec![Side::Outside; known.len()];
         for (bounds, ids) in &self.groups {
             let side = side_of(bounds);
-            for &id in if side == Side::Outside { &[][..] } else { ids } {
-                if let (Some(of_object), Some(object)) =
-                    (sides.get_mut(id as usize), objects.get(id as usize))
-                {
-                    *of_object = if side == Side::Inside { side } else { side_of(&object.bounds) };
-                }
+            if side == Side::Outside {
+                continue;
+            }
+            for id in ids.iter().map(|&id| id as usize).filter(|&id| id < known.len()) {
+                sides[id] = if side == Side::Inside { side } else { side_of(&known[id].bounds) };
             }
         }
+        sides.extend(others.iter().map(|object| side_of(&object.bounds)));
         sides
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
+    use glam::{Affine3A, DVec3, Vec3};
 
     use super::*;
-    use crate::scenes;
+    use crate::geometry::ObjectFlags;
+    use crate::{TriangleMesh, scenes};
+
+    /// Of a scene that has grown since, the objects that are in no group are told by their own boxes, too.
+    #[test]
+    fn objects_in_no_group_are_not_left_out() {
+        let mut scene = scenes::build("forest:triangles=20000", 0.0).unwrap().scene;
+        let (groups, before) = (ObjectGroups::new(&scene), scene.objects().len());
+        let mesh = TriangleMesh::new("new", vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+        scene.add(&mesh, Affine3A::IDENTITY, ObjectFlags::default()).unwrap();
+        for (offset, side) in [(2.0, Side::Inside), (0.5, Side::Across), (-1.0, Side::Outside)] {
+            let sides = groups.sides(&scene, &[HalfSpace { normal: DVec3::X, offset }]);
+            assert_eq!((sides.len(), sides[before]), (before + 1, side));
+        }
+    }
 
     #[test]
     fn groups_say_of_each_object_what_its_box_says() {

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::close_bounds::CloseBounds;
 use super::extent::{LightExtent, reach_of};
+use super::polyhedron::side_of_all;
 use super::{CasterChunks, HalfSpace, Polyhedron, Side, depth_slice, pyramid};
 use crate::geometry::Aabb;
 use crate::light::LightPoint;
@@ -30,12 +31,11 @@ impl Receivers {
     pub fn seen_by(scene: &Scene, camera: &Camera, light: &Light) -> Self {
         let margin = margin(scene.bounds(), camera.eye, light);
         let planes: Vec<_> = frustum(camera).into_iter().map(|plane| plane.grown(margin)).collect();
-        let outside =
-            |bounds: &Aabb| planes.iter().any(|plane| plane.grown(margin).side_of(bounds) == Side::Outside);
+        let wider: Vec<_> = planes.iter().map(|plane| plane.grown(margin)).collect();
         let bounds = scene
             .objects()
             .iter()
-            .filter(|o| o.flags.receives && !outside(&o.bounds))
+            .filter(|o| o.flags.receives && side_of_all(&wider, &o.bounds) != Side::Outside)
             .fold(Aabb::EMPTY, |sum, o| sum.union(o.bounds));
         let mut region = Polyhedron::from_box(bounds, margin);
         planes.into_iter().for_each(|plane| region.clip(plane));
@@ -155,9 +155,7 @@ pub fn objects_among(scene: &Scene, receivers: &Receivers) -> Vec<u32> {
 pub fn reached_receivers(scene: &Scene, light: &Light) -> Vec<u32> {
     let margin = margin(scene.bounds(), Vec3::ZERO, light);
     let planes: Vec<_> = reach_of(light).into_iter().map(|plane| plane.grown(margin)).collect();
-    let reached = |bounds: &Aabb| {
-        !bounds.is_empty() && planes.iter().all(|plane| plane.side_of(bounds) != Side::Outside)
-    };
+    let reached = |bounds: &Aabb| side_of_all(&planes, bounds) != Side::Outside;
     let objects = (0..).zip(scene.objects());
     objects.filter(|(_, o)| o.flags.receives && reached(&o.bounds)).map(|(id, _)| id).collect()
 }
