@@ -261,7 +261,16 @@ fn skipping_changes_no_pixel() {
                 (4, "pixels the light cannot reach"),
             ] {
                 let alone = (0..6).all(|other| other == kind || skipped(other, what) == 0);
-                assert!(alone && skipped(6, what) <= skipped(kind, what), "{name}, {light:?}: {what}");
+                assert!(alone, "{name}, {light:?}: {what}");
+                // Runs and blocks have other bounds if other kinds have left edges and pixels out, so that more or fewer of them lie
+                // beside each other: there are fewer of them, though.
+                let among = |report| match what {
+                    "runs of edges beside a block" => {
+                        skipped(report, what) + counted(report, "pairs of run and block")
+                    }
+                    _ => skipped(report, what),
+                };
+                assert!(among(6) <= among(kind), "{name}, {light:?}: {what}");
             }
             assert!(
                 skipped(3, "runs of edges beside a block") > 0
