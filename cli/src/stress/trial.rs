@@ -17,6 +17,9 @@ pub(crate) struct Trial {
     pub(crate) view: View,
 }
 
+/// The trial that takes seconds to make.
+const TEN_MILLION: &str = "ten million triangles";
+
 /// Size of the pictures.
 const SIZE: (u32, u32) = (96, 72);
 
@@ -25,7 +28,7 @@ const SIZE: (u32, u32) = (96, 72);
 /// # Errors
 /// [`CliError::NoSuchCells`] if no trial and none of [`refusals`] has such a name.
 pub(crate) fn chosen(quick: bool, names: &[String]) -> Result<Vec<Trial>, CliError> {
-    let mut trials = all(quick)?;
+    let mut trials = all(quick, names)?;
     let wanted: Vec<_> = trials.iter().filter(|trial| is_named(&trial.name, names)).collect();
     if wanted.is_empty() && refusals(names).is_empty() {
         return Err(CliError::NoSuchCells { names: names.to_vec() });
@@ -40,8 +43,8 @@ fn is_named(trial: &str, names: &[String]) -> bool {
     names.is_empty() || names.iter().any(|name| trial.contains(name.as_str()))
 }
 
-/// All of them; with `quick` those of one scene and no large ones.
-fn all(quick: bool) -> Result<Vec<Trial>, CliError> {
+/// All of them, but the large one only if it is asked for; with `quick` those of one scene and no large one.
+fn all(quick: bool, names: &[String]) -> Result<Vec<Trial>, CliError> {
     let bases: &[&str] = if quick { &["quads"] } else { &["quads", "ball", "chess", "street"] };
     let mut trials = Vec::new();
     for base in bases {
@@ -51,7 +54,12 @@ fn all(quick: bool) -> Result<Vec<Trial>, CliError> {
         lights(base, &setup, &mut trials);
         cameras(base, &setup, &mut trials);
     }
-    geometry(quick, &mut trials)?;
+    geometry(&mut trials)?;
+    if !quick && is_named(TEN_MILLION, names) {
+        let mut forest = scenes::build("forest:triangles=10000000", 0.0).map_err(SceneSourceError::from)?;
+        forest.camera = forest.camera.with_size(SIZE.0, SIZE.1);
+        push(&mut trials, TEN_MILLION.to_owned(), None, forest);
+    }
     Ok(trials)
 }
 
@@ -141,8 +149,8 @@ fn cameras(base: &str, setup: &SceneSetup, trials: &mut Vec<Trial>) {
     }
 }
 
-/// Geometry that is broken, hardly there, or very much.
-fn geometry(quick: bool, trials: &mut Vec<Trial>) -> Result<(), CliError> {
+/// Geometry that is broken or hardly there.
+fn geometry(trials: &mut Vec<Trial>) -> Result<(), CliError> {
     let broken = |error: SceneError| CliError::Trial(error.to_string());
     let mut base = scenes::build("ball", 0.0).map_err(SceneSourceError::from)?;
     base.camera = base.camera.with_size(SIZE.0, SIZE.1);
@@ -168,11 +176,6 @@ fn geometry(quick: bool, trials: &mut Vec<Trial>) -> Result<(), CliError> {
         });
     });
     push(trials, "every tenth triangle missing".to_owned(), None, open.map_err(broken)?);
-    if !quick {
-        let mut forest = scenes::build("forest:triangles=10000000", 0.0).map_err(SceneSourceError::from)?;
-        forest.camera = forest.camera.with_size(SIZE.0, SIZE.1);
-        push(trials, "ten million triangles".to_owned(), None, forest);
-    }
     Ok(())
 }
 
