@@ -6,12 +6,11 @@
 //! that is a step of a function falls before or after it.
 
 pub mod layout;
-mod pages;
 pub mod shaders;
 
 use scene_core::gpu::{
-    Bound, GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings,
-    SceneGroups, VisibilityPass, VisibilityPassParts, binding, binding_limit, storage_buffer,
+    Bound, GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Pages, Receivers, Recorder,
+    SceneBindings, SceneGroups, VisibilityPass, VisibilityPassParts, binding, binding_limit, storage_buffer,
 };
 use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Origin, Report};
@@ -19,7 +18,6 @@ use scene_core::{Camera, Origin, Report};
 use crate::baked::{self, Baked};
 use crate::{Pdsm, PdsmParams, PreparedPdsm};
 use layout::{MOST_WINDOWS, PdsmUniform, WindowUniform};
-use pages::Pages;
 
 /// The technique on one device: pipelines, and the functions of the light prepared last.
 #[derive(Debug)]
@@ -32,7 +30,7 @@ pub struct PdsmOnGpu {
     from_buffers: Reader,
     /// Made when functions are first more than the device binds in one piece.
     from_pages: Option<Reader>,
-    pages: Pages,
+    pages: Pages<u32>,
     prepared: Option<Prepared>,
 }
 
@@ -159,7 +157,7 @@ impl PdsmOnGpu {
             still: pdsm.windows.len() as u32,
             tolerance: pdsm.tolerance,
             radius: pdsm.radius(),
-            page_bits: self.pages.bits,
+            page_bits: self.pages.bits(),
             ..bytemuck::Zeroable::zeroed()
         };
         // Far below u32's end, as what the device holds is.
