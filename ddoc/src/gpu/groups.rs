@@ -10,7 +10,6 @@ use scene_core::gpu::{
     VisibilityPassParts, WorkBuffer, binding,
 };
 
-use super::layout::Tables;
 use super::{MOST_TURNS, shaders};
 
 /// Entries that `shade.rest` looks at, or counts, in a round; points of the light that are counted at once; rounds beside those,
@@ -64,20 +63,22 @@ pub(super) struct Frame<'a> {
 }
 
 impl Groups {
-    /// Makes the pipelines. `visibility` is the format of the texture that V is written to.
+    /// Makes the pipelines of two shaders, `shade.penumbra`'s and `shade.rest`'s, which bind `types` and V. `visibility` is the
+    /// format of the texture that V is written to.
     pub(super) fn new(
         device: &wgpu::Device,
+        [penumbra, rest]: [&str; 2],
+        types: &[wgpu::BindingType],
         scene: &SceneBindings,
         receivers: &Receivers,
         visibility: wgpu::TextureFormat,
     ) -> Self {
-        let mut types = Tables::BINDINGS.to_vec();
-        types.push(binding::STORAGE_WRITE);
+        let types = [types, &[binding::STORAGE_WRITE]].concat();
         let own = HeldGroup::new(device, "ddoc groups", wgpu::ShaderStages::COMPUTE, &types);
         let written = HeldGroup::new(device, "ddoc write", wgpu::ShaderStages::FRAGMENT, &[binding::STORAGE]);
         let groups = [Some(own.layout()), Some(&scene.triangles_layout), None, Some(receivers.layout())];
-        let penumbra = ComputePass::new(device, "ddoc groups", shaders::GROUPS, "shade_groups", &groups);
-        let rest = ComputePass::new(device, "ddoc rest", shaders::REST, "shade_rest", &groups);
+        let penumbra = ComputePass::new(device, "ddoc groups", penumbra, "shade_groups", &groups);
+        let rest = ComputePass::new(device, "ddoc rest", rest, "shade_rest", &groups);
         let write = VisibilityPass::new(
             device,
             &VisibilityPassParts {
@@ -91,6 +92,11 @@ impl Groups {
             },
         );
         Self { own, written, values: WorkBuffer::new("V of pixels"), penumbra, rest, write }
+    }
+
+    /// As `Reader::give_back`.
+    pub(super) fn give_back(&mut self) {
+        self.own = self.own.another();
     }
 
     /// Records the passes that write V of every pixel. Gives the bytes that they work in.

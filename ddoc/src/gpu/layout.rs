@@ -65,10 +65,10 @@ pub struct DdocUniform {
     pub first_outline: u32,
     /// Where the vectors of outlines begin.
     pub outlines: u32,
-    /// Words that lie in the first of the two tables.
-    pub split: u32,
     /// Receivers that a workgroup of `shade.rest` answers.
     pub alone: u32,
+    /// Zero.
+    pub padding: u32,
     /// Views and their tables.
     pub views: [ViewTable; MOST_VIEWS],
     /// Corners of the light's hull: places, or directions with w = 0; w = −1 where there are no more.
@@ -91,9 +91,14 @@ pub struct Tables {
 }
 
 impl Tables {
-    /// How group 0 binds the uniform, views, both parts of the words, and the edges.
-    pub const BINDINGS: [wgpu::BindingType; 5] =
-        [binding::UNIFORM, binding::STORAGE, binding::STORAGE, binding::STORAGE, binding::STORAGE];
+    /// How group 0 binds the uniform, views, words and edges, the last two in buffers or in pages.
+    pub const fn bindings(are_paged: bool) -> [wgpu::BindingType; 4] {
+        let [words, edges] = match are_paged {
+            false => [binding::STORAGE; 2],
+            true => [binding::ID_LAYERS, binding::FLOAT_LAYERS],
+        };
+        [binding::UNIFORM, binding::STORAGE, words, edges]
+    }
 
     /// Of what the CPU has prepared; `splats` are those of each view.
     pub fn new(prepared: &PreparedDdoc<'_>, splats: &[TileLists]) -> Self {
@@ -150,14 +155,6 @@ impl Tables {
             }
         }
         Self { uniform, words, edges }
-    }
-
-    /// Both parts of the words if a binding takes so many bytes; what lies beyond the second is left to an error.
-    pub fn parts(&mut self, most: u64) -> [&[u32]; 2] {
-        let split = self.words.len().min(usize::try_from(most / 4).unwrap_or(usize::MAX));
-        self.uniform.split = split as u32;
-        let (first, other) = self.words.split_at(split);
-        [first, other]
     }
 }
 
@@ -243,24 +240,14 @@ mod tests {
                 single,
                 first_outline,
                 outlines,
-                split,
                 alone,
+                padding,
                 views,
                 hull,
                 xs,
                 ys
             ]
         );
-    }
-
-    #[test]
-    fn words_lie_in_two_parts() {
-        let words = vec![5, 6, 7];
-        let mut tables = Tables { uniform: Zeroable::zeroed(), words, edges: Vec::new() };
-        assert_eq!(tables.parts(8), [&[5, 6][..], &[7]]);
-        assert_eq!(tables.uniform.split, 2);
-        assert_eq!(tables.parts(u64::MAX), [&[5, 6, 7][..], &[]]);
-        assert_eq!(tables.uniform.split, 3);
     }
 
     #[test]

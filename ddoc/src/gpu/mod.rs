@@ -15,6 +15,8 @@
 //! | `shade.rest` | V of pixels that would take too many rounds so, one after the other, each by all threads of its workgroup |
 //! | `shade.write` | V is copied to the texture |
 //!
+//! Where lists or edges are more than the device binds in one piece, both lie in [`Pages`], and passes of the same shaders read those.
+//!
 //! Where the CPU splats over what is seen, splats here reach whatever the scene holds: they are made once a light and hold
 //! for any camera, so that a frame costs the CPU one recorded pass. Neither changes the image.
 //!
@@ -27,8 +29,8 @@ pub mod shaders;
 
 use gnomon_shadow_map::gpu::layout::ViewUniform;
 use scene_core::gpu::{
-    Bound, GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings,
-    SceneGroups, VisibilityPass, VisibilityPassParts, binding_limit, storage_buffer,
+    Bound, GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Pages, Receivers, Recorder,
+    SceneBindings, SceneGroups, VisibilityPass, VisibilityPassParts, binding_limit, storage_buffer,
 };
 use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Origin, Report};
@@ -50,6 +52,10 @@ const POINTS_AT_ONCE: u32 = 64;
 /// Pixels whose loops that driver counts together.
 const TOGETHER: u32 = 8;
 
+/// What is looked up.
+const LISTS: &str = "lists over tiles";
+const EDGES: &str = "edges";
+
 /// Things that lists can name.
 const MOST_LISTED: u32 = 1 << 27;
 
@@ -59,15 +65,74 @@ pub struct DdocOnGpu {
     technique: Ddoc,
     uniform: HeldBuffer,
     views: HeldBuffer,
-    own: HeldGroup,
     scene: SceneBindings,
     receivers: Receivers,
-    pass: VisibilityPass,
     visibility: wgpu::TextureFormat,
-    /// Made for the first light whose lists are long.
-    groups: Option<Groups>,
+    from_buffers: Reader,
+    /// Made for the first light whose lists or edges are more than the device binds in one piece.
+    from_pages: Option<Reader>,
     always_groups: bool,
     prepared: Option<Prepared>,
+}
+
+/// Passes that look edges up, and what they bind.
+#[derive(Debug)]
+struct Reader {
+    are_paged: bool,
+    own: HeldGroup,
+    pass: VisibilityPass,
+    /// Made for the first light whose lists are long.
+    groups: Option<Groups>,
+}
+
+impl Reader {
+    fn new(
+        device: &wgpu::Device,
+        are_paged: bool,
+        scene: &SceneBindings,
+        receivers: &Receivers,
+        visibility: wgpu::TextureFormat,
+    ) -> Self {
+        let types = Tables::bindings(are_paged);
+        let own = HeldGroup::new(device, "ddoc", wgpu::ShaderStages::FRAGMENT, &types);
+        let pass = VisibilityPass::new(
+            device,
+            &VisibilityPassParts {
+                label: "ddoc",
+                wgsl: if are_paged { shaders::SHADE_PAGED } else { shaders::SHADE },
+                fragment: "shade_ddoc",
+                own: own.layout(),
+                scene,
+                receivers,
+                format: visibility,
+            },
+        );
+        Self { are_paged, own, pass, groups: None }
+    }
+
+    /// Lets go of what was bound last: memory need not hold both.
+    fn give_back(&mut self) {
+        self.own = self.own.another();
+        if let Some(groups) = &mut self.groups {
+            groups.give_back();
+        }
+    }
+
+    /// Makes the passes in groups, if they are not there.
+    fn make_groups(
+        &mut self,
+        device: &wgpu::Device,
+        scene: &SceneBindings,
+        receivers: &Receivers,
+        visibility: wgpu::TextureFormat,
+    ) {
+        let wgsl = match self.are_paged {
+            false => [shaders::GROUPS, shaders::REST],
+            true => [shaders::GROUPS_PAGED, shaders::REST_PAGED],
+        };
+        let types = Tables::bindings(self.are_paged);
+        self.groups.get_or_insert_with(|| Groups::new(device, wgsl, &types, scene, receivers, visibility));
+    }
 }
 
 /// What `prepare` leaves to `shade`.
@@ -75,6 +140,8 @@ pub struct DdocOnGpu {
 struct Prepared {
     /// What group 0 binds; passes of groups V, too.
     bound: Vec<Bound>,
+    /// Read by `from_pages`.
+    are_paged: bool,
     scene: SceneGroups,
     bytes: u64,
     /// Where lists are long, receivers that a workgroup of `shade.rest` answers.
@@ -112,31 +179,18 @@ impl DdocOnGpu {
                 why: "this variant has a CPU path only".to_owned(),
             });
         }
-        let own = HeldGroup::new(device, "ddoc", wgpu::ShaderStages::FRAGMENT, &Tables::BINDINGS);
         let scene = SceneBindings::new(device, wgpu::ShaderStages::FRAGMENT | wgpu::ShaderStages::COMPUTE);
         let receivers = Receivers::new(device);
-        let pass = VisibilityPass::new(
-            device,
-            &VisibilityPassParts {
-                label: "ddoc",
-                wgsl: shaders::SHADE,
-                fragment: "shade_ddoc",
-                own: own.layout(),
-                scene: &scene,
-                receivers: &receivers,
-                format: visibility,
-            },
-        );
+        let from_buffers = Reader::new(device, false, &scene, &receivers, visibility);
         Ok(Self {
             technique: Ddoc::new(params),
             uniform: HeldBuffer::uniform("ddoc"),
             views: HeldBuffer::storage("views of the light"),
-            own,
             scene,
             receivers,
-            pass,
             visibility,
-            groups: None,
+            from_buffers,
+            from_pages: None,
             always_groups: false,
             prepared: None,
         })
@@ -151,14 +205,15 @@ impl DdocOnGpu {
     ///
     /// # Errors
     /// A scene without [`GpuScene::geometry`](scene_core::gpu::GpuScene::geometry); more triangles than edges can be counted
-    /// of; lists longer than the device binds in one piece, or over one tile than a pixel may go through.
+    /// of; more lists or edges than [`Pages`] hold; longer lists over one tile than a pixel may go through.
     pub fn prepare(
         &mut self,
         recorder: &mut Recorder<'_>,
         query: &GpuShadowQuery<'_>,
     ) -> Result<Report, TechniqueError> {
         self.prepared = None;
-        let device = recorder.device;
+        self.from_pages.iter_mut().chain([&mut self.from_buffers]).for_each(Reader::give_back);
+        let Recorder { device, queue, .. } = *recorder;
         let geometry = query.scene.geometry.ok_or_else(|| TechniqueError::Unsupported {
             technique: DdocParams::TECHNIQUE,
             input: "a scene on the GPU alone".to_owned(),
@@ -185,30 +240,44 @@ impl DdocOnGpu {
             .map(|(splats, faces)| [splats.longest(), faces.lists().longest()])
             .collect();
         let points = prepared.points.len();
-        let mut at_once = None;
-        if self.always_groups || are_long(&longest, prepared.variant, points) {
-            at_once = Some(answered_at_once(&longest, points)?);
-            let make = || Groups::new(device, &self.scene, &self.receivers, self.visibility);
-            self.groups.get_or_insert_with(make);
-        }
-        let (bound, bytes) = report.time("prepare.upload", |_| {
+        let in_groups = self.always_groups || are_long(&longest, prepared.variant, points);
+        let at_once = in_groups.then(|| answered_at_once(&longest, points)).transpose()?;
+        let (bound, are_paged, bytes) = report.time("prepare.upload", |_| {
             let mut tables = Tables::new(&prepared, &splats);
             tables.uniform.alone = at_once.unwrap_or(0);
             let views: Vec<_> =
                 prepared.layers.iter().map(|layers| ViewUniform::new(&layers.image.view)).collect();
-            let [first, other] = tables.parts(binding_limit(device));
-            let first = storage_buffer(device, "lists over tiles", bytemuck::cast_slice(first))?;
-            let other = storage_buffer(device, "lists over tiles", bytemuck::cast_slice(other))?;
-            let edges = storage_buffer(device, "edges", bytemuck::cast_slice(&tables.edges))?;
-            let bytes = first.size() + other.size() + edges.size();
+            let bytes = size_of_val(&*tables.words).max(size_of_val(&*tables.edges)) as u64;
+            let are_paged = bytes > binding_limit(device);
+            let (looked_up, bytes): ([Bound; 2], _) = if are_paged {
+                let (words, edges) = (Pages::of(device), Pages::of(device));
+                let (words, of_words) = words.texture(device, queue, LISTS, &[&tables.words])?;
+                let (edges, of_edges) = edges.texture(device, queue, EDGES, &[&tables.edges])?;
+                ([(&words).into(), (&edges).into()], of_words + of_edges)
+            } else {
+                let words = storage_buffer(device, LISTS, bytemuck::cast_slice(&tables.words))?;
+                let edges = storage_buffer(device, EDGES, bytemuck::cast_slice(&tables.edges))?;
+                let bytes = words.size() + edges.size();
+                ([words.into(), edges.into()], bytes)
+            };
             let uniform = self.uniform.get(device, bytemuck::bytes_of(&tables.uniform));
             let views = self.views.get(device, bytemuck::cast_slice(&views));
-            let bound = [uniform, views, first, other, edges].map(Bound::Buffer);
-            Ok::<_, GpuError>((bound.to_vec(), bytes))
+            let bound = [[uniform.into(), views.into()], looked_up].concat();
+            Ok::<_, GpuError>((bound, are_paged, bytes))
         })?;
         report.bytes = bytes;
+        let (scene, receivers, format) = (&self.scene, &self.receivers, self.visibility);
+        let reader = match are_paged {
+            false => &mut self.from_buffers,
+            true => {
+                self.from_pages.get_or_insert_with(|| Reader::new(device, true, scene, receivers, format))
+            }
+        };
+        if in_groups {
+            reader.make_groups(device, scene, receivers, format);
+        }
         let scene = self.scene.groups(device, &query.scene);
-        self.prepared = Some(Prepared { bound, scene, bytes, at_once });
+        self.prepared = Some(Prepared { bound, are_paged, scene, bytes, at_once });
         self.receivers.prepare(recorder, query);
         Ok(report)
     }
@@ -227,15 +296,17 @@ impl DdocOnGpu {
         let not_prepared = || TechniqueError::NotPrepared { technique: DdocParams::TECHNIQUE };
         let prepared = self.prepared.as_ref().ok_or_else(not_prepared)?;
         let receivers = self.receivers.group(recorder.device, camera, gbuffer).ok_or_else(not_prepared)?;
-        let Prepared { bound, scene, bytes, at_once } = prepared;
+        let Prepared { bound, are_paged, scene, bytes, at_once } = prepared;
         let mut report = Report { bytes: *bytes, ..Default::default() };
-        if let (Some(at_once), Some(groups)) = (*at_once, &mut self.groups) {
+        let reader = if *are_paged { self.from_pages.as_mut() } else { Some(&mut self.from_buffers) };
+        let reader = reader.ok_or_else(not_prepared)?;
+        if let (Some(at_once), Some(groups)) = (*at_once, &mut reader.groups) {
             let size = [camera.width, camera.height];
             let frame = Frame { bound, scene, receivers: &receivers, size, at_once };
             report.bytes += groups.record(recorder, &frame, visibility)?;
         } else {
-            let own = self.own.get(recorder.device, bound);
-            self.pass.record(recorder, "shade.penumbra", &own, scene, &receivers, visibility);
+            let own = reader.own.get(recorder.device, bound);
+            reader.pass.record(recorder, "shade.penumbra", &own, scene, &receivers, visibility);
         }
         Ok(report)
     }
