@@ -87,10 +87,8 @@ struct Agreement {
 fn compare(gpu: &Gpu, case: &Case<'_>, technique: &ContactHardening, shown: &ContactHardening) -> Agreement {
     let gbuffer = raster::render_gbuffer(case.scene, case.camera);
     let expected = on_cpu(technique, case, None, &gbuffer);
-    let mut view = gpu.view(case.scene, case.camera).unwrap();
-    view.upload_gbuffer(&gbuffer).unwrap();
     let mut on_gpu = ContactHardeningOnGpu::new(&gpu.device, shown, VISIBILITY_FORMAT).unwrap();
-    let run = view.run(&mut on_gpu, case.light, &gbuffer).unwrap();
+    let run = testing::run_over(gpu, &gbuffer, (case.scene, case.camera, case.light), &mut on_gpu).unwrap();
     let valid = valid_pixels(&gbuffer, case.light);
     let asked: Vec<_> = (0..gbuffer.pixel_count()).filter(|&p| gbuffer.is_seen(p) && valid[p]).collect();
     let agrees = |a: f32, b: f32| (a - b).abs() <= 1.0 / 255.0;

@@ -13,16 +13,12 @@ const LIMIT: u64 = 1 << 20;
 
 /// A device of `layers` pages, which hold 256 KiB of lists and 1 MiB of edges.
 fn small(layers: u32) -> Option<Gpu> {
-    testing::gpu_within(|limits| {
-        limits.max_storage_buffer_binding_size = LIMIT;
-        limits.max_texture_dimension_2d = 256;
-        limits.max_texture_array_layers = layers;
-    })
+    testing::gpu_with_pages(LIMIT, 256, layers)
 }
 
 fn setup(name: &str) -> (SceneSetup, GBuffer) {
     let mut setup = scenes::build(name, 0.4).unwrap();
-    (setup.camera.width, setup.camera.height) = (24, 18);
+    setup.camera = setup.camera.with_size(24, 18);
     let gbuffer = raster::render_gbuffer(&setup.scene, &setup.camera);
     (setup, gbuffer)
 }
@@ -33,9 +29,7 @@ fn run(
     light: &Light,
     ddoc: &mut DdocOnGpu,
 ) -> Result<HeadlessRun, HeadlessError> {
-    let mut view = gpu.view(&setup.scene, &setup.camera)?;
-    view.upload_gbuffer(gbuffer)?;
-    view.run(ddoc, light, gbuffer)
+    testing::run_over(gpu, gbuffer, (&setup.scene, &setup.camera, light), ddoc)
 }
 
 #[test]

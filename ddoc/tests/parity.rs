@@ -60,13 +60,11 @@ fn check_by(gpu: &Gpu, case: &Case<'_>, lists: Lists) {
     let (on_cpu, _) = Ddoc::new(*params).prepare(scene, light).unwrap();
     let mut expected = VisibilityImage::new(gbuffer.width, gbuffer.height);
     on_cpu.shade(&gbuffer, &mut expected);
-    let mut view = gpu.view(scene, camera).unwrap();
-    view.upload_gbuffer(&gbuffer).unwrap();
     let mut on_gpu = DdocOnGpu::new(&gpu.device, *params, VISIBILITY_FORMAT).unwrap();
     if lists == Lists::InGroups {
         on_gpu.always_in_groups();
     }
-    let run = view.run(&mut on_gpu, light, &gbuffer).unwrap();
+    let run = testing::run_over(gpu, &gbuffer, (scene, camera, light), &mut on_gpu).unwrap();
 
     let valid = valid_pixels(&gbuffer, light);
     let seen = (0..gbuffer.pixel_count()).filter(|&pixel| gbuffer.is_seen(pixel));
@@ -207,10 +205,9 @@ fn a_planted_difference_is_found() {
     let (on_cpu, _) = Ddoc::new(params).prepare(&setup.scene, &lights[0]).unwrap();
     let mut expected = VisibilityImage::new(64, 48);
     on_cpu.shade(&gbuffer, &mut expected);
-    let mut view = gpu.view(&setup.scene, &setup.camera).unwrap();
-    view.upload_gbuffer(&gbuffer).unwrap();
     let mut on_gpu = DdocOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT).unwrap();
-    let run = view.run(&mut on_gpu, &lights[1], &gbuffer).unwrap();
+    let asked = (&setup.scene, &setup.camera, &lights[1]);
+    let run = testing::run_over(&gpu, &gbuffer, asked, &mut on_gpu).unwrap();
     let far = |(a, b): (&f32, &f32)| (a - b).abs() > 2.0 / 64.0 + 1.0 / 255.0;
     let found = run.visibility.values.iter().zip(&expected.values).filter(|&pair| far(pair)).count();
     assert!(found > 30, "{found}");

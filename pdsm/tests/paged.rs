@@ -16,18 +16,14 @@ fn params() -> PdsmParams {
 /// Bytes that the small device binds in one piece.
 const LIMIT: u64 = 1 << 22;
 
-/// A device whose pages hold 1 MiB, `layers` of them, and that binds 4 MiB of a buffer.
+/// A device of `layers` pages, which hold 1 MiB each.
 fn small(layers: u32) -> Option<Gpu> {
-    testing::gpu_within(|limits| {
-        limits.max_storage_buffer_binding_size = LIMIT;
-        limits.max_texture_dimension_2d = 512;
-        limits.max_texture_array_layers = layers;
-    })
+    testing::gpu_with_pages(LIMIT, 512, layers)
 }
 
 fn setup(name: &str) -> (SceneSetup, GBuffer) {
     let mut setup = scenes::build(name, 0.4).unwrap();
-    (setup.camera.width, setup.camera.height) = (96, 72);
+    setup.camera = setup.camera.with_size(96, 72);
     let gbuffer = raster::render_gbuffer(&setup.scene, &setup.camera);
     (setup, gbuffer)
 }
@@ -38,9 +34,7 @@ fn run(
     light: &Light,
     pdsm: &mut PdsmOnGpu,
 ) -> Result<HeadlessRun, HeadlessError> {
-    let mut view = gpu.view(&setup.scene, &setup.camera)?;
-    view.upload_gbuffer(gbuffer)?;
-    view.run(pdsm, light, gbuffer)
+    testing::run_over(gpu, gbuffer, (&setup.scene, &setup.camera, light), pdsm)
 }
 
 fn bits(image: &VisibilityImage) -> Vec<u32> {

@@ -51,10 +51,8 @@ fn on_cpu(params: PdsmParams, case: &Case<'_>, gbuffers: &[GBuffer]) -> Vec<Visi
 }
 
 fn on_gpu(gpu: &Gpu, params: PdsmParams, case: &Case<'_>, gbuffer: &GBuffer) -> HeadlessRun {
-    let mut view = gpu.view(case.scene, case.camera).unwrap();
-    view.upload_gbuffer(gbuffer).unwrap();
     let mut pdsm = PdsmOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT);
-    view.run(&mut pdsm, &case.light, gbuffer).unwrap()
+    testing::run_over(gpu, gbuffer, (case.scene, case.camera, &case.light), &mut pdsm).unwrap()
 }
 
 /// The G-buffer with every position moved along its normal by `share` of what both backends may differ in: the
@@ -177,10 +175,9 @@ fn every_kind_of_functions() {
         let (on_cpu, _) = baked.prepare(&setup.scene, &light).unwrap();
         on_cpu.shade(&gbuffer, &mut expected);
         assert_eq!(on_cpu.moving_windows().is_empty(), name == "quads");
-        let mut view = gpu.view(&setup.scene, &setup.camera).unwrap();
-        view.upload_gbuffer(&gbuffer).unwrap();
         let mut on_gpu = PdsmOnGpu::from_baked(&gpu.device, baked, VISIBILITY_FORMAT);
-        let run = view.run(&mut on_gpu, &light, &gbuffer).unwrap();
+        let run =
+            testing::run_over(&gpu, &gbuffer, (&setup.scene, &setup.camera, &light), &mut on_gpu).unwrap();
         let seen = (0..gbuffer.pixel_count()).filter(|&pixel| gbuffer.is_seen(pixel)).count();
         let pairs = run.visibility.values.iter().zip(&expected.values);
         let differ = pairs.filter(|(a, b)| (*a - *b).abs() > 1.0 / 255.0).count();

@@ -36,11 +36,10 @@ fn on_gpu(
     params: WedgeParams,
     list_bytes: u64,
 ) -> (VisibilityImage, [u32; 3]) {
-    let mut view = gpu.view(case.scene, &case.camera).unwrap();
-    view.upload_gbuffer(gbuffer).unwrap();
     let mut on_gpu = PenumbraWedgesOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT);
     on_gpu.set_list_bytes(list_bytes);
-    let run = view.run(&mut on_gpu, &case.light, gbuffer).unwrap();
+    let asked = (case.scene, &case.camera, &case.light);
+    let run = testing::run_over(gpu, gbuffer, asked, &mut on_gpu).unwrap();
     let counters: Vec<u32> = gpu.read_buffer(&on_gpu.counters(&gpu.device).unwrap()).unwrap();
     let pixels: Vec<u32> = gpu.read_buffer(&on_gpu.pixels(&gpu.device).unwrap()).unwrap();
     (run.visibility, [counters[0], counters[2], pixels[0]])

@@ -63,10 +63,9 @@ fn on_cpu<'a>(case: &Case<'a>, gbuffer: &GBuffer) -> (PreparedPsm<'a>, Visibilit
 }
 
 fn on_gpu(gpu: &Gpu, case: &Case<'_>, gbuffer: &GBuffer) -> (PsmOnGpu, HeadlessRun) {
-    let mut view = gpu.view(case.scene, case.camera).unwrap();
-    view.upload_gbuffer(gbuffer).unwrap();
     let mut technique = PsmOnGpu::new(&gpu.device, case.params, VISIBILITY_FORMAT).unwrap();
-    let run = view.run(&mut technique, &case.light, gbuffer).unwrap();
+    let asked = (case.scene, case.camera, &case.light);
+    let run = testing::run_over(gpu, gbuffer, asked, &mut technique).unwrap();
     (technique, run)
 }
 

@@ -43,10 +43,9 @@ fn compare(gpu: &Gpu, case: &Case<'_>) -> Agreement {
     let mut expected = VisibilityImage::new(gbuffer.width, gbuffer.height);
     on_cpu.shade(&gbuffer, &mut expected);
 
-    let mut view = gpu.view(case.scene, case.camera).unwrap();
-    view.upload_gbuffer(&gbuffer).unwrap();
     let mut on_gpu = ShadowMapOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT).unwrap();
-    let run = view.run(&mut on_gpu, &case.light, &gbuffer).unwrap();
+    let asked = (case.scene, case.camera, &case.light);
+    let run = testing::run_over(gpu, &gbuffer, asked, &mut on_gpu).unwrap();
     // Faces without casters: `hard` has none, by the boxes of objects on both backends; a clipped box may tell more here.
     cpu_report.skipped.remove("undrawn faces");
     assert_eq!(run.report.skipped, cpu_report.skipped, "{}", case.name);
@@ -167,10 +166,9 @@ fn a_planted_difference_is_found() {
     let (on_cpu, _) = ShadowMap::new(params).prepare(&setup.scene, &light);
     let mut expected = VisibilityImage::new(gbuffer.width, gbuffer.height);
     on_cpu.shade(&gbuffer, &mut expected);
-    let mut view = gpu.view(&setup.scene, &setup.camera).unwrap();
-    view.upload_gbuffer(&gbuffer).unwrap();
     let mut on_gpu = ShadowMapOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT).unwrap();
-    let run = view.run(&mut on_gpu, &other, &gbuffer).unwrap();
+    let asked = (&setup.scene, &setup.camera, &other);
+    let run = testing::run_over(&gpu, &gbuffer, asked, &mut on_gpu).unwrap();
     let same_ids = [on_cpu.maps()[0].triangles.clone()];
     let found = (0..gbuffer.pixel_count())
         .filter(|&pixel| (run.visibility.values[pixel] - expected.values[pixel]).abs() > 1.0 / 255.0)

@@ -57,10 +57,8 @@ fn check(gpu: &Gpu, name: &str, scene: &Scene, camera: &Camera, light: &Light) -
     let mut expected = VisibilityImage::new(gbuffer.width, gbuffer.height);
     AliasFree::new(scene, true).shade(light, &gbuffer, &mut expected);
     let params = ShadowMapParams { variant: Variant::AliasFree, ..Default::default() };
-    let mut view = gpu.view(scene, camera).unwrap();
-    view.upload_gbuffer(&gbuffer).unwrap();
     let mut on_gpu = ShadowMapOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT).unwrap();
-    let run = view.run(&mut on_gpu, light, &gbuffer).unwrap();
+    let run = testing::run_over(gpu, &gbuffer, (scene, camera, light), &mut on_gpu).unwrap();
     let (mut different, mut grazed) = (0, 0);
     for pixel in (0..gbuffer.pixel_count()).filter(|&pixel| gbuffer.is_seen(pixel)) {
         let (got, wanted) = (run.visibility.values[pixel], expected.values[pixel]);

@@ -51,10 +51,8 @@ fn compare(gpu: &Gpu, case: &Case<'_>, params: ShadowMapParams) -> Agreement {
     let (on_cpu, mut cpu_report) = ShadowMap::new(params).prepare(scene, &light);
     let mut expected = VisibilityImage::new(gbuffer.width, gbuffer.height);
     on_cpu.shade(&gbuffer, &mut expected);
-    let mut view = gpu.view(scene, camera).unwrap();
-    view.upload_gbuffer(&gbuffer).unwrap();
     let mut on_gpu = ShadowMapOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT).unwrap();
-    let run = view.run(&mut on_gpu, &light, &gbuffer).unwrap();
+    let run = testing::run_over(gpu, &gbuffer, (scene, camera, &light), &mut on_gpu).unwrap();
     // Faces without casters, which filters need: on the GPU a pass clears them, as it does others.
     cpu_report.skipped.remove("undrawn faces");
     assert_eq!(run.report.skipped, cpu_report.skipped, "{name}");

@@ -30,10 +30,8 @@ fn on_gpu(
     gbuffer: &GBuffer,
     params: VolumeParams,
 ) -> (VisibilityImage, [u32; 4]) {
-    let mut view = gpu.view(scene, camera).unwrap();
-    view.upload_gbuffer(gbuffer).unwrap();
     let mut on_gpu = StencilVolumesOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT);
-    let run = view.run(&mut on_gpu, light, gbuffer).unwrap();
+    let run = testing::run_over(gpu, gbuffer, (scene, camera, light), &mut on_gpu).unwrap();
     let StencilVolumesOnGpu::Volumes(volumes) = &mut on_gpu else { return (run.visibility, [0; 4]) };
     let counters: Vec<u32> = gpu.read_buffer(&volumes.counters(&gpu.device).unwrap()).unwrap();
     let pixels: Vec<u32> = gpu.read_buffer(&volumes.pixels(&gpu.device).unwrap()).unwrap();

@@ -6,7 +6,8 @@ use wgpu::naga;
 
 use super::pipeline::{made, shader_module};
 use super::storage::filled_buffer;
-use super::{Gpu, GpuError};
+use super::{Gpu, GpuError, GpuShadowTechnique, HeadlessError, HeadlessRun};
+use crate::{Camera, GBuffer, Light, Scene};
 
 /// Pipelines and layouts of bind groups that this thread has made so far by the parts of [`gpu`](super): what a frame adds is
 /// what it did not reuse.
@@ -46,6 +47,34 @@ pub fn gpu_that_binds(bytes: u64) -> Option<Gpu> {
     gpu_within(|limits| {
         *limits = wgpu::Limits { max_storage_buffer_binding_size: bytes, ..wgpu::Limits::default() };
     })
+}
+
+/// As [`gpu`], a device that binds no more than so many `bytes` of a storage buffer in one piece, and whose textures are of so many
+/// texels a side and so many layers: [`Pages`](super::Pages) hold no more than that.
+///
+/// # Panics
+/// As [`gpu`].
+pub fn gpu_with_pages(bytes: u64, side: u32, layers: u32) -> Option<Gpu> {
+    gpu_within(|limits| {
+        limits.max_storage_buffer_binding_size = bytes;
+        limits.max_texture_dimension_2d = side;
+        limits.max_texture_array_layers = layers;
+    })
+}
+
+/// A technique's first frame over a G-buffer that the CPU drew, so that both backends are asked about the same surfaces.
+///
+/// # Errors
+/// What the device or the technique objects to.
+pub fn run_over(
+    gpu: &Gpu,
+    gbuffer: &GBuffer,
+    (scene, camera, light): (&Scene, &Camera, &Light),
+    technique: &mut dyn GpuShadowTechnique,
+) -> Result<HeadlessRun, HeadlessError> {
+    let mut view = gpu.view(scene, camera)?;
+    view.upload_gbuffer(gbuffer)?;
+    view.run(technique, light, gbuffer)
 }
 
 /// Runs the compute entry point `main` of `wgsl`, one workgroup of `@workgroup_size(64)` for every 64 `inputs`,
