@@ -29,7 +29,7 @@ pub mod shaders;
 
 use gnomon_shadow_map::gpu::layout::ViewUniform;
 use scene_core::gpu::{
-    Bound, GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Pages, Receivers, Recorder,
+    Bound, GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Pages, Readers, Receivers, Recorder,
     SceneBindings, SceneGroups, VisibilityPass, VisibilityPassParts, binding_limit, storage_buffer,
 };
 use scene_core::technique::{Params as _, TechniqueError};
@@ -68,9 +68,7 @@ pub struct DdocOnGpu {
     scene: SceneBindings,
     receivers: Receivers,
     visibility: wgpu::TextureFormat,
-    from_buffers: Reader,
-    /// Made for the first light whose lists or edges are more than the device binds in one piece.
-    from_pages: Option<Reader>,
+    readers: Readers<Reader>,
     always_groups: bool,
     prepared: Option<Prepared>,
 }
@@ -140,8 +138,6 @@ impl Reader {
 struct Prepared {
     /// What group 0 binds; passes of groups V, too.
     bound: Vec<Bound>,
-    /// Read by `from_pages`.
-    are_paged: bool,
     scene: SceneGroups,
     bytes: u64,
     /// Where lists are long, receivers that a workgroup of `shade.rest` answers.
@@ -189,8 +185,7 @@ impl DdocOnGpu {
             scene,
             receivers,
             visibility,
-            from_buffers,
-            from_pages: None,
+            readers: Readers::new(from_buffers),
             always_groups: false,
             prepared: None,
         })
@@ -212,7 +207,7 @@ impl DdocOnGpu {
         query: &GpuShadowQuery<'_>,
     ) -> Result<Report, TechniqueError> {
         self.prepared = None;
-        self.from_pages.iter_mut().chain([&mut self.from_buffers]).for_each(Reader::give_back);
+        self.readers.each().for_each(Reader::give_back);
         let Recorder { device, queue, .. } = *recorder;
         let geometry = query.scene.geometry.ok_or_else(|| TechniqueError::Unsupported {
             technique: DdocParams::TECHNIQUE,
@@ -267,17 +262,13 @@ impl DdocOnGpu {
         })?;
         report.bytes = bytes;
         let (scene, receivers, format) = (&self.scene, &self.receivers, self.visibility);
-        let reader = match are_paged {
-            false => &mut self.from_buffers,
-            true => {
-                self.from_pages.get_or_insert_with(|| Reader::new(device, true, scene, receivers, format))
-            }
-        };
+        let of_pages = || Reader::new(device, true, scene, receivers, format);
+        let reader = self.readers.choose(are_paged, of_pages);
         if in_groups {
             reader.make_groups(device, scene, receivers, format);
         }
         let scene = self.scene.groups(device, &query.scene);
-        self.prepared = Some(Prepared { bound, are_paged, scene, bytes, at_once });
+        self.prepared = Some(Prepared { bound, scene, bytes, at_once });
         self.receivers.prepare(recorder, query);
         Ok(report)
     }
@@ -296,10 +287,9 @@ impl DdocOnGpu {
         let not_prepared = || TechniqueError::NotPrepared { technique: DdocParams::TECHNIQUE };
         let prepared = self.prepared.as_ref().ok_or_else(not_prepared)?;
         let receivers = self.receivers.group(recorder.device, camera, gbuffer).ok_or_else(not_prepared)?;
-        let Prepared { bound, are_paged, scene, bytes, at_once } = prepared;
+        let Prepared { bound, scene, bytes, at_once } = prepared;
         let mut report = Report { bytes: *bytes, ..Default::default() };
-        let reader = if *are_paged { self.from_pages.as_mut() } else { Some(&mut self.from_buffers) };
-        let reader = reader.ok_or_else(not_prepared)?;
+        let reader = self.readers.chosen();
         if let (Some(at_once), Some(groups)) = (*at_once, &mut reader.groups) {
             let size = [camera.width, camera.height];
             let frame = Frame { bound, scene, receivers: &receivers, size, at_once };

@@ -138,10 +138,6 @@ pub struct PdsmUniform {
     pub tolerance: f32,
     /// Pixels that interpolation reaches: 1 reads four pixels, 0 the nearest one.
     pub radius: u32,
-    /// Texels a side of a page of words are 2 to this, where these are in pages.
-    pub page_bits: u32,
-    /// Zero.
-    pub padding: [u32; 3],
 }
 
 #[cfg(test)]
@@ -183,6 +179,6 @@ mod tests {
                 last_texel
             ]
         );
-        assert_layout!(PdsmUniform, SHADE, "Pdsm", [windows, count, still, tolerance, radius, page_bits]);
+        assert_layout!(PdsmUniform, SHADE, "Pdsm", [windows, count, still, tolerance, radius]);
     }
 }

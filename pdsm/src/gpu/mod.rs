@@ -9,7 +9,7 @@ pub mod layout;
 pub mod shaders;
 
 use scene_core::gpu::{
-    Bound, GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Pages, Receivers, Recorder,
+    Bound, GpuError, GpuGBuffer, GpuShadowQuery, HeldBuffer, HeldGroup, Pages, Readers, Receivers, Recorder,
     SceneBindings, SceneGroups, VisibilityPass, VisibilityPassParts, binding, binding_limit, storage_buffer,
 };
 use scene_core::technique::{Params as _, TechniqueError};
@@ -27,9 +27,7 @@ pub struct PdsmOnGpu {
     scene: SceneBindings,
     receivers: Receivers,
     format: wgpu::TextureFormat,
-    from_buffers: Reader,
-    /// Made when functions are first more than the device binds in one piece.
-    from_pages: Option<Reader>,
+    readers: Readers<Reader>,
     pages: Pages<u32>,
     prepared: Option<Prepared>,
 }
@@ -52,8 +50,6 @@ enum Source {
 #[derive(Debug)]
 struct Prepared {
     own: wgpu::BindGroup,
-    /// Read by `from_pages`.
-    is_paged: bool,
     scene: SceneGroups,
     bytes: u64,
     survives_camera: bool,
@@ -81,8 +77,7 @@ impl PdsmOnGpu {
             scene,
             receivers,
             format: visibility,
-            from_buffers,
-            from_pages: None,
+            readers: Readers::new(from_buffers),
             pages: Pages::of(device),
             prepared: None,
         }
@@ -157,7 +152,6 @@ impl PdsmOnGpu {
             still: pdsm.windows.len() as u32,
             tolerance: pdsm.tolerance,
             radius: pdsm.radius(),
-            page_bits: self.pages.bits(),
             ..bytemuck::Zeroable::zeroed()
         };
         // Far below u32's end, as what the device holds is.
@@ -171,15 +165,12 @@ impl PdsmOnGpu {
         let uniform = self.uniform.get(device, bytemuck::bytes_of(&uniform));
         let bytes = held + offsets.size();
         let bound = [vec![uniform.into(), offsets.into()], functions].concat();
-        let reader = if is_paged {
-            let (scene, receivers, format) = (&self.scene, &self.receivers, self.format);
-            self.from_pages.get_or_insert_with(|| Reader::of_pages(device, scene, receivers, format))
-        } else {
-            &mut self.from_buffers
-        };
+        let (scene, receivers, format) = (&self.scene, &self.receivers, self.format);
+        let of_pages = || Reader::of_pages(device, scene, receivers, format);
+        let reader = self.readers.choose(is_paged, of_pages);
         let own = reader.own.get(device, &bound);
         let (scene, survives_camera) = (self.scene.groups(device, &query.scene), pdsm.survives_camera());
-        self.prepared = Some(Prepared { own, is_paged, scene, bytes, survives_camera });
+        self.prepared = Some(Prepared { own, scene, bytes, survives_camera });
         self.receivers.prepare(recorder, query);
         Ok(())
     }
@@ -187,9 +178,7 @@ impl PdsmOnGpu {
     /// Lets go of what was prepared last: memory need not hold both.
     fn give_back(&mut self) {
         self.prepared = None;
-        for reader in self.from_pages.iter_mut().chain([&mut self.from_buffers]) {
-            reader.own = reader.own.another();
-        }
+        self.readers.each().for_each(|reader| reader.own = reader.own.another());
     }
 
     /// Whether what was prepared last would be the same for any other camera.
@@ -211,8 +200,7 @@ impl PdsmOnGpu {
         let not_prepared = || TechniqueError::NotPrepared { technique: PdsmParams::TECHNIQUE };
         let prepared = self.prepared.as_ref().ok_or_else(not_prepared)?;
         let receivers = self.receivers.group(recorder.device, camera, gbuffer).ok_or_else(not_prepared)?;
-        let reader = if prepared.is_paged { self.from_pages.as_ref() } else { Some(&self.from_buffers) };
-        let lookup = &reader.ok_or_else(not_prepared)?.lookup;
+        let lookup = &self.readers.chosen().lookup;
         lookup.record(recorder, "shade.lookup", &prepared.own, &prepared.scene, &receivers, visibility);
         Ok(Report { bytes: prepared.bytes, ..Default::default() })
     }

@@ -64,7 +64,7 @@ pub use headless::{HeadlessError, HeadlessFrame, HeadlessRun, HeadlessView};
 pub use held::{Bound, HeldBuffer, HeldGroup, HeldGroups, binding};
 pub use layers::DepthLayers;
 pub use layout::{CameraUniform, DepthUniform, LightUniform};
-pub use pages::Pages;
+pub use pages::{Pages, Readers};
 pub use receivers::Receivers;
 pub use scene::{GpuCutouts, GpuObject, GpuScene, SceneBindings, SceneBuffers, SceneGroups, SceneHandles};
 pub use storage::{binding_limit, filled_buffer, pieces, storage_buffer, table_buffer};

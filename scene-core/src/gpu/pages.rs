@@ -33,6 +33,7 @@ impl Texel for [f32; 4] {
 /// many bits, on the page of all others.
 #[derive(Clone, Copy, Debug)]
 pub struct Pages<T> {
+    /// Texels a side of a page are 2 to this.
     bits: u32,
     /// Pages of one texture.
     count: u32,
@@ -48,11 +49,6 @@ impl<T: Texel> Pages<T> {
         let pages = Self { bits, count: 1, of: PhantomData };
         let count = (MOST_BYTES / pages.most_bytes()) as u32;
         Self { count: count.min(limits.max_texture_array_layers), ..pages }
-    }
-
-    /// Texels a side of a page are 2 to this.
-    pub fn bits(self) -> u32 {
-        self.bits
     }
 
     /// Bytes that they hold.
@@ -133,6 +129,40 @@ impl<T: Texel> Pages<T> {
     }
 }
 
+/// What reads a table from buffers, and what reads it from [`Pages`], made for the first table that wants them.
+#[derive(Debug)]
+pub struct Readers<R> {
+    from_buffers: R,
+    from_pages: Option<R>,
+    is_paged: bool,
+}
+
+impl<R> Readers<R> {
+    /// Buffers are chosen.
+    pub fn new(from_buffers: R) -> Self {
+        Self { from_buffers, from_pages: None, is_paged: false }
+    }
+
+    /// The reader of buffers or of pages, made if it is not there, from now on the one that is [`chosen`](Self::chosen).
+    pub fn choose(&mut self, is_paged: bool, of_pages: impl FnOnce() -> R) -> &mut R {
+        self.is_paged = is_paged;
+        if is_paged { self.from_pages.get_or_insert_with(of_pages) } else { &mut self.from_buffers }
+    }
+
+    /// The one chosen last.
+    pub fn chosen(&mut self) -> &mut R {
+        match &mut self.from_pages {
+            Some(from_pages) if self.is_paged => from_pages,
+            _ => &mut self.from_buffers,
+        }
+    }
+
+    /// All there are.
+    pub fn each(&mut self) -> impl Iterator<Item = &mut R> {
+        self.from_pages.iter_mut().chain([&mut self.from_buffers])
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -141,21 +171,28 @@ mod tests {
     #[test]
     fn pages_are_as_large_as_texels_let_them() {
         let Some(gpu) = testing::gpu() else { return };
-        assert_eq!(Pages::<u32>::of(&gpu.device).bits(), 11);
-        assert_eq!(Pages::<[f32; 4]>::of(&gpu.device).bits(), 10);
+        assert_eq!(Pages::<u32>::of(&gpu.device).bits, 11);
+        assert_eq!(Pages::<[f32; 4]>::of(&gpu.device).bits, 10);
         let pages = Pages::<[f32; 4]>::of(&gpu.device);
         assert!(pages.most_bytes() <= MOST_BYTES);
         assert_eq!(pages.place(3 + (5 << 10) + (7 << 20)), [3, 5, 7]);
     }
 
     #[test]
+    fn a_reader_of_pages_is_made_once() {
+        let mut readers = Readers::new("buffers");
+        assert_eq!(*readers.choose(false, || unreachable!()), "buffers");
+        assert_eq!(*readers.choose(true, || "pages"), "pages");
+        assert_eq!(*readers.choose(false, || unreachable!()), "buffers");
+        assert_eq!(*readers.chosen(), "buffers");
+        assert_eq!(*readers.choose(true, || unreachable!()), "pages");
+        assert_eq!(*readers.chosen(), "pages");
+        assert_eq!(readers.each().count(), 2);
+    }
+
+    #[test]
     fn what_pages_do_not_hold_is_refused() {
-        let Some(gpu) = testing::gpu_within(|limits| {
-            limits.max_texture_dimension_2d = 512;
-            limits.max_texture_array_layers = 2;
-        }) else {
-            return;
-        };
+        let Some(gpu) = testing::gpu_with_pages(1 << 20, 512, 2) else { return };
         let pages = Pages::<u32>::of(&gpu.device);
         assert_eq!(pages.most_bytes(), 2 << 20);
         let words = vec![0; 1 << 18];
