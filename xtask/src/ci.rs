@@ -22,13 +22,15 @@ pub(crate) fn run() -> Result<(), CheckError> {
     let environment = report.environment().into_iter().chain(gpu);
     let environment: Vec<_> = environment.collect();
     let environment: Vec<_> = environment.iter().map(|(name, value)| (*name, value.as_str())).collect();
-    let tested = cargo(&["test", "--workspace", "--profile", "ci"], &environment);
+    // Examples are not built again: clippy has compiled them, and tests that want one take its code.
+    let tested = cargo(&["test", "--workspace", "--profile", "ci", "--tests"], &environment);
     // Where a test failed others have not run, and asked for nothing.
     let found = report.write(tested.is_ok())?;
     tested?;
     if let Some(finding) = found.first() {
         return Err(CheckError::Failed(format!("{}: {}", finding.name(), finding.why())));
     }
+    cargo(&["test", "--workspace", "--profile", "ci", "--doc"], &environment)?;
     gallery::run_built(true)?;
     instructions::run_built(false)
 }
