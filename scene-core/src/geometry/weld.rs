@@ -5,6 +5,7 @@
 //! point, needs no tolerance, and gives the same result at any scale.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// Which vertices share a position.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,36 +17,33 @@ pub struct Weld {
     pub unique: usize,
 }
 
-/// A slot of the table that holds no vertex.
-const EMPTY: u32 = u32::MAX;
-
-/// Welds `positions` by exact equality in expected linear time.
+/// Welds `positions` by exact equality. Sorts their hashes, in parallel: a table of them would miss the cache once a vertex.
 ///
 /// NaN coordinates are welded if their bits are equal. An empty slice gives an empty weld. Positions beyond
 /// the first `u32::MAX` are out of reach of 32-bit indices and are not read.
 pub fn weld(positions: &[Vec3]) -> Weld {
-    let positions = &positions[..positions.len().min(EMPTY as usize)];
-    // At most half full, so that a probe of the open-addressing table ends after a step or two.
-    let slots = (positions.len() * 2).next_power_of_two();
-    let mask = slots - 1;
-    let mut table = vec![EMPTY; slots];
-    let mut representative = Vec::with_capacity(positions.len());
+    let positions = &positions[..positions.len().min(u32::MAX as usize)];
+    // Hash above vertex: one integer, which sorts as the pair does.
+    let entry = |(vertex, &position): (usize, &Vec3)| hash(key(position)) >> 32 << 32 | vertex as u64;
+    let mut by_hash: Vec<u64> = positions.par_iter().enumerate().map(entry).collect();
+    by_hash.par_sort_unstable();
+    let mut representative = vec![0; positions.len()];
     let mut unique = 0;
-    for (vertex, &position) in positions.iter().enumerate() {
-        let key = key(position);
-        let mut slot = hash(key) as usize & mask;
-        let first = loop {
-            match table[slot] {
-                EMPTY => {
-                    table[slot] = vertex as u32;
-                    unique += 1;
-                    break vertex as u32;
-                }
-                other if self::key(positions[other as usize]) == key => break other,
-                _ => slot = (slot + 1) & mask,
-            }
-        };
-        representative.push(first);
+    let mut firsts = Vec::new();
+    for same_hash in by_hash.chunk_by(|a, b| a >> 32 == b >> 32) {
+        firsts.clear();
+        for vertex in same_hash.iter().map(|&entry| entry as u32) {
+            let position = || key(positions[vertex as usize]);
+            // Almost always there is one; alone in its run, it is not even read.
+            let first =
+                firsts.iter().copied().find(|&first: &u32| key(positions[first as usize]) == position());
+            let first = first.unwrap_or_else(|| {
+                firsts.push(vertex);
+                vertex
+            });
+            representative[vertex as usize] = first;
+        }
+        unique += firsts.len();
     }
     Weld { representative, unique }
 }
@@ -86,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn grids_do_not_degrade_the_table() {
+    fn grids_do_not_share_hashes() {
         // A power-of-two grid differs in few bits of each coordinate: a weak hash would take minutes here.
         let side = 64;
         let grid: Vec<Vec3> = (0..side * side * side)
