@@ -7,8 +7,8 @@ use std::error::Error;
 use std::time::Instant;
 
 use gnomon_psm::points::PointClouds;
-use gnomon_psm::{Psm, PsmParams};
-use scene_core::{Light, VisibilityImage, raster, scenes};
+use gnomon_psm::{Casters, Psm, PsmParams};
+use scene_core::{Light, Report, VisibilityImage, raster, scenes};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1).map(|a| a.parse::<u32>());
@@ -25,16 +25,20 @@ fn main() -> Result<(), Box<dyn Error>> {
         light => light,
     };
     let gbuffer = raster::render_gbuffer(scene, &camera);
-    let technique = Psm::new(PsmParams { map_size, ..Default::default() });
+    let params = PsmParams { map_size, ..Default::default() };
+    let technique = Psm::new(params);
     let start = Instant::now();
     let clouds = PointClouds::new(scene);
     let made = start.elapsed().as_secs_f64() * 1e3;
+    let surfaces = Casters::new(scene, &params, &mut Report::default()).surfaces;
     let mut first: Option<VisibilityImage> = None;
-    for (name, clouds) in [("triangles", &PointClouds::default()), ("points", &clouds)] {
+    for (name, clouds) in [("triangles", PointClouds::default()), ("points", clouds)] {
+        let casters = Casters { clouds, surfaces: surfaces.clone() };
+        let clouds = &casters.clouds;
         let (mut times, mut drawn) = (Vec::new(), 0);
         let mut image = VisibilityImage::new(camera.width, camera.height);
         for _ in 0..5 {
-            let (prepared, report) = technique.prepare_with(clouds, scene, &light, &camera, &gbuffer);
+            let (prepared, report) = technique.prepare_with(&casters, scene, &light, &camera, &gbuffer);
             times.push(report.stages_ms["prepare.maps"]);
             let maps = prepared.maps().iter();
             drawn = maps.map(|map| clouds.chosen(scene, &map.view, map_size).count()).sum();

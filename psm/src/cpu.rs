@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use gnomon_shadow_map::cpu::shade_pixels;
-use gnomon_shadow_map::light_maps::LightMaps;
 use scene_core::raster::{DepthMap, DepthOptions, RasterScratch, render_depth_and_triangles_into};
 use scene_core::relevance::{Backdrops, CasterChunks, CasterRegion, relevant_casters};
 use scene_core::{GBuffer, Report, Scene, VisibilityImage};
@@ -77,11 +76,11 @@ fn inside_map(scene: &Scene, drawn: &Drawn, view: &MapView, report: &mut Report)
 
 /// `shade.lookup`: V of every pixel that sees a surface, NaN elsewhere; or what [`Show`] asks for.
 pub fn shade(prepared: &PreparedPsm<'_>, gbuffer: &GBuffer, visibility: &mut VisibilityImage) {
-    let LightMaps { scene, light, .. } = &prepared.questions;
+    let surroundings = prepared.surroundings();
     shade_pixels(&prepared.questions, gbuffer, visibility, |receiver| {
         let Some((map, texel)) = prepared.map_of(receiver.point) else { return 1.0 };
         match prepared.params.show {
-            Show::Visibility => f32::from(u8::from(!map.shadows(scene, light, receiver, texel))),
+            Show::Visibility => f32::from(u8::from(!map.shadows(&surroundings, receiver, texel))),
             Show::Texels => {
                 let (point, normal) = (receiver.point.as_dvec3(), receiver.normal.as_dvec3());
                 let d = map.view.texel_in_pixels(map.size, &prepared.frame, point, normal);

@@ -3,9 +3,11 @@
 pub mod aliasing;
 pub mod caster_boxes;
 pub mod caster_image;
+mod casters;
 pub mod choice;
 pub mod cpu;
 pub mod fitted;
+pub mod follow;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod light_image;
@@ -21,15 +23,20 @@ pub mod views;
 pub mod virtual_camera;
 pub mod warp;
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use gnomon_shadow_map::cpu::answer_points;
 use gnomon_shadow_map::light_maps::LightMaps;
 use gnomon_shadow_map::receiver_plane::plane_tolerance;
+use scene_core::geometry::Surfaces;
 use scene_core::{Camera, GBuffer, Light, Origin, Report, Scene, VisibilityImage, relevance};
 
+pub use casters::Casters;
 pub use choice::Parametrisation;
 pub use lookup::Occluder;
-pub use params::{PsmParams, Show, Variant};
+use lookup::Surroundings;
+pub use params::{Lookup, PsmParams, Show, Variant};
 use points::PointClouds;
 pub use technique::Factory;
 use view_frame::ViewFrame;
@@ -57,6 +64,7 @@ pub struct PsmMap {
 pub struct PreparedPsm<'a> {
     /// Light, tolerance and what all receivers are asked first; its own maps are none.
     questions: LightMaps<'a>,
+    surfaces: Option<Arc<Surfaces>>,
     maps: Vec<PsmMap>,
     frame: ViewFrame,
     params: PsmParams,
@@ -70,7 +78,7 @@ impl Psm {
 
     /// Draws the maps of `light` for what `camera` sees in `gbuffer`. They hold for this G-buffer alone.
     ///
-    /// Clouds of a scene that marks objects to be drawn as points are made anew; see [`prepare_with`](Self::prepare_with).
+    /// What lives as long as the scene is made anew; see [`prepare_with`](Self::prepare_with).
     pub fn prepare<'a>(
         &self,
         scene: &'a Scene,
@@ -79,16 +87,16 @@ impl Psm {
         gbuffer: &GBuffer,
     ) -> (PreparedPsm<'a>, Report) {
         let mut report = Report::default();
-        let clouds = report.time("prepare.points", |_| PointClouds::new(scene));
-        let (prepared, rest) = self.prepare_with(&clouds, scene, light, camera, gbuffer);
+        let casters = Casters::new(scene, &self.params, &mut report);
+        let (prepared, rest) = self.prepare_with(&casters, scene, light, camera, gbuffer);
         report.merge(&rest);
         (prepared, report)
     }
 
-    /// As [`prepare`](Self::prepare), with the clouds of the same scene, kept from frame to frame.
+    /// As [`prepare`](Self::prepare), with the casters of the same scene, kept from frame to frame.
     pub fn prepare_with<'a>(
         &self,
-        clouds: &PointClouds,
+        lasting: &Casters,
         scene: &'a Scene,
         light: &Light,
         camera: &Camera,
@@ -100,7 +108,7 @@ impl Psm {
         let (scene, light, camera) = (origin.scene(scene), origin.light(light), origin.camera(camera));
         let gbuffer = origin.gbuffer(gbuffer);
         let own = (!origin.is_world()).then(|| PointClouds::new(&scene));
-        let clouds = own.as_ref().unwrap_or(clouds);
+        let clouds = own.as_ref().unwrap_or(&lasting.clouds);
         let tolerance = plane_tolerance(scene.bounds(), &light);
         let casters = relevance::told_apart_with_solids(&scene, &light, tolerance);
         report.skip("casters", casters.backdrops.len() as u64);
@@ -113,7 +121,8 @@ impl Psm {
         let backdrops = casters.backdrops.into_iter().cloned().collect();
         let tolerance = lookup::tolerance(scene.bounds(), &light);
         let questions = LightMaps { origin, scene, light, maps: Vec::new(), backdrops, tolerance };
-        (PreparedPsm { questions, maps, frame: ViewFrame::new(&camera), params }, report)
+        let frame = ViewFrame::new(&camera);
+        (PreparedPsm { questions, surfaces: lasting.surfaces.clone(), maps, frame, params }, report)
     }
 }
 
@@ -121,6 +130,12 @@ impl PreparedPsm<'_> {
     /// The maps: none if nothing can be in shadow, one, or one a face of the cube around the light.
     pub fn maps(&self) -> &[PsmMap] {
         &self.maps
+    }
+
+    /// What its maps' texels are asked with.
+    fn surroundings(&self) -> Surroundings<'_> {
+        let LightMaps { scene, light, .. } = &self.questions;
+        Surroundings { scene, surfaces: self.surfaces.as_deref(), light: light.center() }
     }
 
     /// The map that holds `point`, and the texel it falls into.
@@ -144,7 +159,8 @@ impl PreparedPsm<'_> {
     /// has more is left alone.
     pub fn visibility_at(&self, points: &[Vec3], visibility: &mut [f32]) -> Report {
         let mut report = Report::default();
-        let LightMaps { origin, scene, light, tolerance, .. } = &self.questions;
+        let LightMaps { origin, light, tolerance, .. } = &self.questions;
+        let surroundings = self.surroundings();
         report.time("shade.lookup", |_| {
             answer_points(points, visibility, |point| {
                 let point = origin.point(point);
@@ -156,7 +172,7 @@ impl PreparedPsm<'_> {
                 }
                 let shadowed = self
                     .map_of(point)
-                    .is_some_and(|(map, texel)| map.shadows_free(scene, light, point, *tolerance, texel));
+                    .is_some_and(|(map, texel)| map.shadows_free(&surroundings, (point, *tolerance), texel));
                 if shadowed || self.questions.is_behind_backdrop(point) { 0.0 } else { 1.0 }
             });
         });

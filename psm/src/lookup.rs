@@ -6,12 +6,13 @@
 use glam::{DVec3, Vec3};
 use gnomon_shadow_map::light_maps::Receiver;
 use gnomon_shadow_map::receiver_plane::{is_behind, is_near, meets, plane_tolerance, rises_above};
-use scene_core::geometry::Aabb;
+use scene_core::geometry::{Aabb, Surfaces};
 use scene_core::light::LightPoint;
 use scene_core::raster::DEPTH_POSITION_ERROR;
 use scene_core::{GBuffer, Light, Scene};
 
 use crate::PsmMap;
+use crate::follow::{Followed, follow};
 
 /// The stored surface point that a receiver is compared with.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +26,20 @@ pub struct Occluder {
     /// Distance of the receiver from the ray of the texel's centre, across it; world units.
     pub aside: f32,
 }
+
+/// What the map of a light shows.
+#[derive(Clone, Copy, Debug)]
+pub struct Surroundings<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its surfaces, where they are to be followed.
+    pub surfaces: Option<&'a Surfaces>,
+    /// The light's centre.
+    pub light: LightPoint,
+}
+
+/// The texels around one, nearest first.
+const AROUND: [[i32; 2]; 8] = [[-1, 0], [1, 0], [0, -1], [0, 1], [-1, -1], [1, -1], [-1, 1], [1, 1]];
 
 /// Distance from a plane, in scene units, below which a point counts as on it; see [`plane_tolerance`], whose bound this one is
 /// never above.
@@ -60,15 +75,9 @@ impl PsmMap {
 
     /// What the light sees in the texel `[column, row]` that `point` falls into; `None` if there is nothing.
     #[inline]
-    pub fn occluder(
-        &self,
-        scene: &Scene,
-        light: LightPoint,
-        point: Vec3,
-        texel: [usize; 2],
-    ) -> Option<Occluder> {
-        let [column, row] = texel;
-        let triangle = self.triangles[row * self.size as usize + column];
+    pub fn occluder(&self, seen: &Surroundings<'_>, point: Vec3, texel: [usize; 2]) -> Option<Occluder> {
+        let ([column, row], light) = (texel, seen.light);
+        let triangle = self.triangle(texel);
         if triangle == GBuffer::NOTHING {
             return None;
         }
@@ -81,7 +90,7 @@ impl PsmMap {
         let (to_ray, [x, y]) = self.view.ndc.across(center, point, to_light(point));
         let origin = point + to_ray;
         let direction = to_light(origin);
-        let [a, b, c] = scene.corners(triangle as usize).map(Vec3::as_dvec3);
+        let [a, b, c] = seen.scene.corners(triangle as usize).map(Vec3::as_dvec3);
         let normal = (b - a).cross(c - a);
         // In units of the direction. Edge-on the plane is no help, the corners are.
         let along = [a, b, c].map(|corner| (corner - origin).dot(direction) / direction.length_squared());
@@ -102,37 +111,106 @@ impl PsmMap {
         })
     }
 
-    /// Whether `receiver`, which falls into `texel`, is in shadow.
+    /// Whether `receiver`, which falls into `texel`, is in shadow: by the surfaces that the texels around it show, or without them by
+    /// the one texel.
     #[inline]
-    pub fn shadows(&self, scene: &Scene, light: &Light, receiver: &Receiver, texel: [usize; 2]) -> bool {
+    pub fn shadows(&self, seen: &Surroundings<'_>, receiver: &Receiver, texel: [usize; 2]) -> bool {
+        let asked = (receiver.point, receiver.tolerance);
+        self.shadows_by(seen, asked, texel, |texel| self.texel_shadows(seen, receiver, texel))
+    }
+
+    /// Whether a free point, which has no surface of its own, is in shadow.
+    pub fn shadows_free(&self, seen: &Surroundings<'_>, asked: (Vec3, f32), texel: [usize; 2]) -> bool {
+        self.shadows_by(seen, asked, texel, |texel| self.texel_shadows_free(seen, asked, texel))
+    }
+
+    /// The order of questions for both. `ask` asks one texel.
+    #[inline]
+    fn shadows_by(
+        &self,
+        seen: &Surroundings<'_>,
+        asked: (Vec3, f32),
+        texel: [usize; 2],
+        ask: impl Fn([usize; 2]) -> bool,
+    ) -> bool {
+        let Some(surfaces) = seen.surfaces else { return ask(texel) };
+        let own = self.triangle(texel);
+        let own_leads = match own {
+            GBuffer::NOTHING => Followed::Misses,
+            _ => follow(seen.scene, surfaces, own, asked, seen.light),
+        };
+        if own_leads == Followed::Shadows {
+            return true;
+        }
+        let mut last = own;
+        for around in AROUND {
+            let triangle = self.triangle(self.beside(texel, around));
+            if triangle == GBuffer::NOTHING || triangle == own || triangle == last {
+                continue;
+            }
+            last = triangle;
+            if !is_behind(seen.scene.corners(triangle as usize), asked.0, seen.light, asked.1) {
+                continue;
+            }
+            if follow(seen.scene, surfaces, triangle, asked, seen.light) == Followed::Shadows {
+                return true;
+            }
+        }
+        if !ask(texel) {
+            return false;
+        }
+        // What shadows the texel's centre does not reach the receiver.
+        if own_leads == Followed::Lost {
+            return true;
+        }
+        let Some(occluder) = self.occluder(seen, asked.0, texel) else { return false };
+        if surfaces.of(own as usize).extent >= 3.0 * occluder.texel {
+            return false;
+        }
+        let dark = AROUND.iter().filter(|around| ask(self.beside(texel, **around))).count();
+        // With its own.
+        dark + 1 > AROUND.len().div_ceil(2)
+    }
+
+    /// The triangle that a texel keeps.
+    #[inline]
+    fn triangle(&self, [column, row]: [usize; 2]) -> u32 {
+        self.triangles[row * self.size as usize + column]
+    }
+
+    /// The texel beside another; at the map's border that one itself.
+    #[inline]
+    fn beside(&self, texel: [usize; 2], around: [i32; 2]) -> [usize; 2] {
+        let last = self.size as usize - 1;
+        [0, 1].map(|i| texel[i].saturating_add_signed(around[i] as isize).min(last))
+    }
+
+    /// Whether what `texel` keeps shadows `receiver`.
+    #[inline]
+    fn texel_shadows(&self, seen: &Surroundings<'_>, receiver: &Receiver, texel: [usize; 2]) -> bool {
         let Receiver { point, normal, tolerance, .. } = *receiver;
-        let light = light.center();
-        self.occluder(scene, light, point, texel).is_some_and(|occluder| {
-            let corners = scene.corners(occluder.triangle);
+        self.occluder(seen, point, texel).is_some_and(|occluder| {
+            let corners = seen.scene.corners(occluder.triangle);
             let snapping = occluder.texel * DEPTH_POSITION_ERROR;
             rises_above(occluder.point, point, normal, tolerance + snapping)
-                && is_behind(corners, point, light, tolerance)
+                && is_behind(corners, point, seen.light, tolerance)
                 // What is known of the distance is better than half a diagonal of the texel.
-                && (!is_near(occluder.point, point, normal, light, 2.0 * occluder.aside + snapping)
-                    || meets(corners, point, light))
+                && (!is_near(occluder.point, point, normal, seen.light, 2.0 * occluder.aside + snapping)
+                    || meets(corners, point, seen.light))
         })
     }
 
-    /// Whether a free point, which has no surface of its own, is in shadow: the stored point is nearer to the light, and
-    /// the point lies behind its triangle.
-    pub fn shadows_free(
+    /// The same for a free point: the stored point is nearer to the light, and the point lies behind its triangle.
+    fn texel_shadows_free(
         &self,
-        scene: &Scene,
-        light: &Light,
-        point: Vec3,
-        tolerance: f32,
+        seen: &Surroundings<'_>,
+        (point, tolerance): (Vec3, f32),
         texel: [usize; 2],
     ) -> bool {
-        let light = light.center();
-        let (to_light, _) = light.ray_from(point);
-        self.occluder(scene, light, point, texel).is_some_and(|occluder| {
+        let (to_light, _) = seen.light.ray_from(point);
+        self.occluder(seen, point, texel).is_some_and(|occluder| {
             (occluder.point - point).dot(to_light) > 0.0
-                && is_behind(scene.corners(occluder.triangle), point, light, tolerance)
+                && is_behind(seen.scene.corners(occluder.triangle), point, seen.light, tolerance)
         })
     }
 }

@@ -35,6 +35,17 @@ impl Variant {
     }
 }
 
+/// What of the map a receiver is compared with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Lookup {
+    /// The surfaces that the texels around it show, followed to its own ray: outlines of shadows are the mesh's.
+    #[default]
+    Surface,
+    /// The texel that it falls into, as in the paper: outlines have the texels' steps.
+    Texel,
+}
+
 /// What is written for a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -55,6 +66,8 @@ pub struct PsmParams {
     pub variant: Variant,
     /// Texels a side of each map, 1 to 16,384. Error falls in proportion; memory is 4 bytes a texel and map.
     pub map_size: u32,
+    /// What a receiver is compared with.
+    pub lookup: Lookup,
     /// What is written for a pixel.
     pub show: Show,
     /// Leave out casters that lie beside a map. Off only to measure.
@@ -62,7 +75,13 @@ pub struct PsmParams {
 }
 
 impl PsmParams {
-    const DEFAULT: Self = Self { variant: Variant::Auto, map_size: 1024, show: Show::Visibility, skip: true };
+    const DEFAULT: Self = Self {
+        variant: Variant::Auto,
+        map_size: 1024,
+        lookup: Lookup::Surface,
+        show: Show::Visibility,
+        skip: true,
+    };
 }
 
 impl Default for PsmParams {
@@ -86,6 +105,12 @@ impl Params for PsmParams {
             kind: SettingKind::Int { min: 1, max: 16_384 },
             unit: "texels a side",
             doc: "resolution of each map",
+        },
+        Setting {
+            name: "lookup",
+            kind: SettingKind::Choice(&["surface", "texel"]),
+            unit: "",
+            doc: "compare a receiver with the surfaces that the texels around it show, followed to its own ray, or with one texel",
         },
         Setting {
             name: "show",

@@ -15,8 +15,7 @@ use scene_core::{GBuffer, Report, VisibilityImage, raster};
 
 #[cfg(feature = "gpu")]
 use crate::gpu::PsmOnGpu;
-use crate::points::PointClouds;
-use crate::{PreparedPsm, Psm, PsmParams};
+use crate::{Casters, PreparedPsm, Psm, PsmParams};
 
 impl ShadowTechnique for Psm {
     fn name(&self) -> &'static str {
@@ -54,9 +53,8 @@ impl ShadowTechnique for Psm {
         query: &ShadowQuery<'a>,
     ) -> Result<(Box<dyn PreparedShadow + 'a>, Report), TechniqueError> {
         let mut report = Report::default();
-        let clouds = report.time("prepare.points", |_| PointClouds::new(query.scene));
-        report.bytes = clouds.bytes();
-        let frame = ForAnyFrame { technique: *self, query: *query, clouds, free: OnceLock::new() };
+        let casters = Casters::new(query.scene, &self.params, &mut report);
+        let frame = ForAnyFrame { technique: *self, query: *query, casters, free: OnceLock::new() };
         Ok((Box::new(frame), report))
     }
 
@@ -100,7 +98,7 @@ impl GpuShadowTechnique for PsmOnGpu {
 struct ForAnyFrame<'a> {
     technique: Psm,
     query: ShadowQuery<'a>,
-    clouds: PointClouds,
+    casters: Casters,
     /// For free points: the maps of what the camera sees.
     free: OnceLock<PreparedPsm<'a>>,
 }
@@ -109,7 +107,8 @@ impl PreparedShadow for ForAnyFrame<'_> {
     fn shade(&self, gbuffer: &GBuffer, visibility: &mut VisibilityImage) -> Result<Report, TechniqueError> {
         TechniqueError::check_output(gbuffer.pixel_count(), visibility.values.len())?;
         let ShadowQuery { scene, light, camera } = self.query;
-        let (prepared, mut report) = self.technique.prepare_with(&self.clouds, scene, light, camera, gbuffer);
+        let (prepared, mut report) =
+            self.technique.prepare_with(&self.casters, scene, light, camera, gbuffer);
         report.merge(&prepared.shade(gbuffer, visibility));
         Ok(report)
     }
@@ -120,7 +119,8 @@ impl PreparedShadow for ForAnyFrame<'_> {
         let mut report = Report::default();
         let prepared = self.free.get_or_init(|| {
             let gbuffer = raster::render_gbuffer(scene, camera);
-            let (prepared, drawn) = self.technique.prepare_with(&self.clouds, scene, light, camera, &gbuffer);
+            let (prepared, drawn) =
+                self.technique.prepare_with(&self.casters, scene, light, camera, &gbuffer);
             report = drawn;
             prepared
         });

@@ -60,12 +60,13 @@ fn buffers_of_the_wrong_size_are_refused() {
     conformance::assert_refuses_wrong_sizes(&Psm::default());
 }
 
-/// A scene far from zero is shaded about as well as at zero: half as much again. Counted from zero, nothing nearer to its caster
-/// than six steps of a map's depths would be in shadow.
+/// A scene far from zero is shaded about as well as at zero, where no pixel may be wrong: its borders move by half a pixel at most,
+/// which vertices rounded to steps of a quarter pixel leave. Counted from zero, nothing nearer to its caster than six steps of a map's
+/// depths would be in shadow.
 #[test]
 fn far_from_zero_shadows_stay() {
     let error = conformance::far_from_zero(&Psm::default());
-    assert!(error.there < 1.5 * error.here, "{error:?}");
+    assert!(error.there < error.here + error.moved, "{error:?}");
 }
 
 /// The G-buffer of a GPU holds a distance, from which positions follow along the ray of a pixel's centre: they lie beside the rounded ones

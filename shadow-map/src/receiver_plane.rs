@@ -117,10 +117,18 @@ pub fn is_near(stored: Vec3, receiver: Vec3, normal: Vec3, light: LightPoint, te
 /// spans with the edges. Where the triangle lies along the line is not asked.
 #[inline]
 pub fn meets(corners: [Vec3; 3], point: Vec3, light: LightPoint) -> bool {
+    let sides = edge_volumes(corners, point, light);
+    sides.iter().all(|&side| side >= 0.0) || sides.iter().all(|&side| side <= 0.0)
+}
+
+/// The signed volumes that the line from `point` towards the light spans with the edges, from corner i to corner i + 1: all of the
+/// sign of their sum, which is the triangle's side that the light sees, where the line passes between the corners. Of two
+/// triangles that share an edge one has the negative of the other's.
+#[inline]
+pub fn edge_volumes(corners: [Vec3; 3], point: Vec3, light: LightPoint) -> [f32; 3] {
     let (direction, _) = light.ray_from(point);
     let [a, b, c] = corners.map(|corner| corner - point);
-    let sides = [a.cross(b), b.cross(c), c.cross(a)].map(|normal| normal.dot(direction));
-    sides.iter().all(|&side| side >= 0.0) || sides.iter().all(|&side| side <= 0.0)
+    [a.cross(b), b.cross(c), c.cross(a)].map(|normal| normal.dot(direction))
 }
 
 #[cfg(test)]

@@ -31,11 +31,13 @@ pub struct FrameUniform {
     pub rows: u32,
     /// Bits of the tolerance of the comparison, an f32.
     pub tolerance: u32,
+    /// 1 where lookups follow surfaces.
+    pub follows: u32,
 }
 
 impl FrameUniform {
-    /// Of these settings, for `images` images of the light.
-    pub fn new(params: &PsmParams, images: usize, grid: TileGrid, tolerance: f32) -> Self {
+    /// Of these settings, for `images` images of the light; `follows` says whether there are surfaces to follow.
+    pub fn new(params: &PsmParams, images: usize, grid: TileGrid, tolerance: f32, follows: bool) -> Self {
         let variant = Variant::ALL.iter().position(|&variant| variant == params.variant);
         Self {
             map_size: params.map_size,
@@ -46,6 +48,7 @@ impl FrameUniform {
             columns: grid.columns,
             rows: grid.rows,
             tolerance: tolerance.to_bits(),
+            follows: u32::from(follows),
         }
     }
 }
@@ -199,7 +202,7 @@ mod tests {
             FrameUniform,
             LOOKUP,
             "Frame",
-            [map_size, variant, shows_texels, images, side, columns, rows, tolerance]
+            [map_size, variant, shows_texels, images, side, columns, rows, tolerance, follows]
         );
         assert_layout!(
             ImageUniform,

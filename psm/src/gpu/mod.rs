@@ -13,6 +13,9 @@
 //! | `prepare.maps` | the depth pass | the nearest triangle a texel |
 //! | `shade.lookup` | full screen | V |
 //!
+//! Where lookups follow surfaces these are found once a scene (`prepare.surfaces`), from its geometry in memory. Without that, or where the
+//! device binds less than their 16 bytes a triangle in one piece, receivers are compared with one texel.
+//!
 //! All casters are drawn, since nobody on the CPU knows what a map covers: that costs time and changes no pixel.
 //!
 //! Positions are relative to the eye. V differs from the CPU's where the hardware's rasteriser gives a texel on a
@@ -25,18 +28,20 @@ pub mod shaders;
 use std::ops::Range;
 
 use gnomon_shadow_map::receiver_plane::plane_tolerance;
+use scene_core::geometry::{SurfaceTriangle, Surfaces};
 use scene_core::gpu::{
-    Bound, ComputePass, DepthIds, DepthLayers, DepthPass, DepthTarget, GpuError, GpuGBuffer, GpuShadowQuery,
-    HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings, SceneGroups, SceneHandles, VisibilityPass,
-    VisibilityPassParts, WorkBuffer, WrittenProjection, binding,
+    Bound, ComputePass, DepthIds, DepthLayers, DepthPass, DepthTarget, GpuError, GpuGBuffer, GpuScene,
+    GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings, SceneGroups, SceneHandles,
+    VisibilityPass, VisibilityPassParts, WorkBuffer, WrittenProjection, binding, binding_limit,
+    storage_buffer,
 };
 use scene_core::technique::{Params as _, TechniqueError};
-use scene_core::{Camera, Report, relevance};
+use scene_core::{Camera, Report, Scene, relevance};
 
 use crate::seen::TileGrid;
 use crate::view_frame::ViewFrame;
 use crate::views::Images;
-use crate::{PsmParams, lookup};
+use crate::{Lookup, PsmParams, lookup};
 use layout::{
     BoxOnGpu, CHOICE_BYTES, FIT_BYTES, FITTERS, FrameUniform, ImageUniform, PROJECTION_STRIDE, TILE_BYTES,
     ViewOnGpu,
@@ -58,6 +63,8 @@ pub struct PsmOnGpu {
     scene: SceneBindings,
     receivers: Receivers,
     lookup: VisibilityPass,
+    surfaces: Option<HeldSurfaces>,
+    no_surfaces: HeldBuffer,
     prepared: Option<Prepared>,
     views: Option<wgpu::Buffer>,
 }
@@ -95,11 +102,37 @@ struct Written {
     projections: WorkBuffer,
 }
 
+/// The surfaces of a scene; `None` where they are more than the device binds.
+#[derive(Debug)]
+struct HeldSurfaces {
+    /// The scene's buffers they were made for.
+    made_for: [wgpu::Buffer; 2],
+    buffer: Option<wgpu::Buffer>,
+}
+
+impl HeldSurfaces {
+    fn new(device: &wgpu::Device, scene: &GpuScene<'_>, geometry: &Scene) -> Self {
+        let bytes = size_of::<SurfaceTriangle>() as u64 * geometry.triangles().len() as u64;
+        let fits = bytes <= binding_limit(device);
+        let surfaces = fits.then(|| Surfaces::new(geometry).ok()).flatten();
+        let upload = |surfaces: &Surfaces| {
+            storage_buffer(device, "surfaces", bytemuck::cast_slice(surfaces.triangles())).ok()
+        };
+        let made_for = [scene.positions.clone(), scene.triangles.clone()];
+        Self { made_for, buffer: surfaces.as_ref().and_then(upload) }
+    }
+
+    fn are_of(&self, scene: &GpuScene<'_>) -> bool {
+        self.made_for[0] == *scene.positions && self.made_for[1] == *scene.triangles
+    }
+}
+
 /// What `prepare` leaves to `shade`.
 #[derive(Debug)]
 struct Prepared {
     images: Images,
     tolerance: f32,
+    surfaces: Option<wgpu::Buffer>,
     /// Ranges of triangles that are drawn.
     casters: Vec<Range<u32>>,
     scene: SceneGroups,
@@ -126,7 +159,7 @@ impl PsmOnGpu {
             .collect();
         let making = HeldGroup::new(device, "psm", wgpu::ShaderStages::COMPUTE, &types);
         let stages = wgpu::ShaderStages::FRAGMENT;
-        let types = [binding::UNIFORM, binding::STORAGE, binding::ID_LAYERS];
+        let types = [binding::UNIFORM, binding::STORAGE, binding::ID_LAYERS, binding::STORAGE];
         let own = HeldGroup::new(device, "perspective shadow maps", stages, &types);
         let scene = SceneBindings::new(device, stages);
         let receivers = Receivers::new(device);
@@ -162,12 +195,15 @@ impl PsmOnGpu {
             scene,
             receivers,
             lookup,
+            surfaces: None,
+            no_surfaces: HeldBuffer::storage("no surfaces"),
             prepared: None,
             views: None,
         })
     }
 
-    /// `prepare.images`: takes over light and scene. Records nothing; the maps are drawn when it shades.
+    /// `prepare.images` and, once a scene, `prepare.surfaces`: takes over light and scene. Records nothing; the maps are drawn when it
+    /// shades.
     ///
     /// # Errors
     /// None today: what the device has not enough of is told by [`shade`](Self::shade).
@@ -189,6 +225,8 @@ impl PsmOnGpu {
             (casters, Images::new(&geometry, query.light, query.camera, boxes, self.params.variant))
         });
         report.skip("casters", casters.backdrops.len() as u64);
+        let surfaces = self.surfaces_of(recorder.device, &query.scene, &mut report);
+        report.bytes = surfaces.as_ref().map_or(0, wgpu::Buffer::size);
         let is_drawn = |id: usize| {
             let object = &geometry.objects()[id];
             !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
@@ -197,12 +235,28 @@ impl PsmOnGpu {
         self.prepared = Some(Prepared {
             images,
             tolerance: lookup::tolerance(geometry.bounds(), query.light),
+            surfaces,
             casters: objects.map(|(_, object)| object.triangles.clone()).collect(),
             scene: self.scene.groups(recorder.device, &query.scene),
             drawn: SceneHandles::new(&query.scene),
         });
         self.receivers.prepare(recorder, query);
         Ok(report)
+    }
+
+    /// The surfaces of `scene`, kept from the last call if that had the same; `None` where lookups cannot or shall not follow them.
+    fn surfaces_of(
+        &mut self,
+        device: &wgpu::Device,
+        scene: &GpuScene<'_>,
+        report: &mut Report,
+    ) -> Option<wgpu::Buffer> {
+        let geometry = scene.geometry.filter(|_| self.params.lookup == Lookup::Surface)?;
+        let kept = self.surfaces.take().filter(|surfaces| surfaces.are_of(scene));
+        let surfaces = kept.unwrap_or_else(|| {
+            report.time("prepare.surfaces", |_| HeldSurfaces::new(device, scene, geometry))
+        });
+        self.surfaces.insert(surfaces).buffer.clone()
     }
 
     /// Records everything else: the maps for what `gbuffer` sees, and the pass that writes V of every pixel, 1 where nothing is
@@ -226,7 +280,13 @@ impl PsmOnGpu {
 
         let grid = TileGrid::new(gbuffer.size[0], gbuffer.size[1]);
         let tiles = u64::from(grid.columns) * u64::from(grid.rows) * count;
-        let frame = FrameUniform::new(&self.params, count as usize, grid, prepared.tolerance);
+        let frame = FrameUniform::new(
+            &self.params,
+            count as usize,
+            grid,
+            prepared.tolerance,
+            prepared.surfaces.is_some(),
+        );
         let frame = self.frame.get(device, bytemuck::bytes_of(&frame));
         let view_frame = ViewFrame::new(camera);
         let boxes = BoxOnGpu::all(&prepared.images, &view_frame);
@@ -268,7 +328,9 @@ impl PsmOnGpu {
 
         let mut report = Report { bytes: self.layers.bytes(), ..Default::default() };
         let ids = self.layers.bound_ids().ok_or_else(not_prepared)?;
-        let own = self.own.get(device, &[frame.into(), views.clone().into(), ids]);
+        let surfaces = prepared.surfaces.clone();
+        let surfaces = surfaces.unwrap_or_else(|| self.no_surfaces.get(device, &[]));
+        let own = self.own.get(device, &[frame.into(), views.clone().into(), ids, surfaces.into()]);
         self.lookup.record(recorder, "shade.lookup", &own, &prepared.scene, &receivers, visibility);
         report.bytes += tiles * (TILE_BYTES + FIT_BYTES);
         self.views = Some(views);
