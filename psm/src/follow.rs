@@ -20,8 +20,10 @@ pub const STEPS: u32 = 16;
 pub enum Followed {
     /// The receiver's ray meets it before it reaches the light.
     Shadows,
-    /// It ends before the ray, or the ray meets it where it does not lie before the receiver.
-    Misses,
+    /// The receiver's ray meets it where the receiver is not behind it.
+    InFront,
+    /// It ends before the ray.
+    Ends,
     /// Not known: the triangle is in no surface, or the ray is too many triangles away.
     Lost,
 }
@@ -45,13 +47,13 @@ pub fn follow(
         let sum: f32 = sides.iter().sum();
         // Turned from the light, or edge-on: here it ends.
         if sum == 0.0 || sum * facing < 0.0 {
-            return Followed::Misses;
+            return Followed::Ends;
         }
         facing = sum.signum();
         let sides = sides.map(|side| side * facing);
         if sides.iter().all(|&side| side >= 0.0) {
             let shadows = is_behind(corners, point, light, tolerance);
-            return if shadows { Followed::Shadows } else { Followed::Misses };
+            return if shadows { Followed::Shadows } else { Followed::InFront };
         }
         // Over the edge that the ray is farthest beyond; not back.
         let across = surfaces.of(triangle as usize).across;
@@ -62,7 +64,7 @@ pub fn follow(
             }
         }
         if next == NO_TRIANGLE {
-            return Followed::Misses;
+            return Followed::Ends;
         }
         (before, triangle) = (triangle, next);
     }

@@ -34,8 +34,7 @@ use scene_core::{Camera, GBuffer, Light, Origin, Report, Scene, VisibilityImage,
 
 pub use casters::Casters;
 pub use choice::Parametrisation;
-pub use lookup::Occluder;
-use lookup::Surroundings;
+pub use lookup::{Occluder, Surroundings};
 pub use params::{Lookup, PsmParams, Show, Variant};
 use points::PointClouds;
 pub use technique::Factory;

@@ -136,7 +136,7 @@ impl PsmMap {
         let Some(surfaces) = seen.surfaces else { return ask(texel) };
         let own = self.triangle(texel);
         let own_leads = match own {
-            GBuffer::NOTHING => Followed::Misses,
+            GBuffer::NOTHING => Followed::InFront,
             _ => follow(seen.scene, surfaces, own, asked, seen.light),
         };
         if own_leads == Followed::Shadows {
@@ -149,27 +149,26 @@ impl PsmMap {
                 continue;
             }
             last = triangle;
-            if !is_behind(seen.scene.corners(triangle as usize), asked.0, seen.light, asked.1) {
-                continue;
-            }
             if follow(seen.scene, surfaces, triangle, asked, seen.light) == Followed::Shadows {
                 return true;
             }
         }
-        if !ask(texel) {
+        // Nothing that is seen shadows it but, maybe, what goes on unseen between the texels.
+        if own_leads == Followed::InFront || !ask(texel) {
             return false;
         }
-        // What shadows the texel's centre does not reach the receiver.
         if own_leads == Followed::Lost {
             return true;
         }
         let Some(occluder) = self.occluder(seen, asked.0, texel) else { return false };
+        // A surface larger than the texels around ends where it is seen to end. One that is smaller may have others beside it, as leaves
+        // have, of which no texel's centre sees all: then the texels are asked how many of them are dark.
         if surfaces.of(own as usize).extent >= 3.0 * occluder.texel {
             return false;
         }
         let dark = AROUND.iter().filter(|around| ask(self.beside(texel, **around))).count();
-        // With its own.
-        dark + 1 > AROUND.len().div_ceil(2)
+        // With its own texel most of nine.
+        dark >= AROUND.len() / 2
     }
 
     /// The triangle that a texel keeps.

@@ -127,7 +127,9 @@ mod tests {
 
     fn scene_of(meshes: &[TriangleMesh], flags: ObjectFlags) -> Scene {
         let mut scene = Scene::new();
-        meshes.iter().for_each(|mesh| drop(scene.add(mesh, Affine3A::IDENTITY, flags).unwrap()));
+        for mesh in meshes {
+            scene.add(mesh, Affine3A::IDENTITY, flags).unwrap();
+        }
         scene
     }
 
