@@ -2,7 +2,7 @@
 
 use glam::{Affine3A, DVec3, Vec3};
 use gnomon_psm::view_frame::ViewFrame;
-use gnomon_psm::{Psm, PsmParams, Variant};
+use gnomon_psm::{Lookup, Psm, PsmParams, Variant};
 use scene_core::geometry::ObjectFlags;
 use scene_core::{Camera, GBuffer, Light, Scene, TriangleMesh, VisibilityImage, raster};
 
@@ -127,9 +127,11 @@ fn shadows_of_lids_are_their_projections() {
     for direction in
         [Vec3::NEG_Y, Vec3::new(0.5, -1.0, 0.3), Vec3::new(0.2, -0.6, 1.0), Vec3::new(-0.2, -0.6, -1.0)]
     {
-        for variant in Variant::ALL {
+        for (variant, lookup) in
+            Variant::ALL.into_iter().flat_map(|v| [Lookup::Texel, Lookup::Surface].map(|lookup| (v, lookup)))
+        {
             let gbuffer = raster::render_gbuffer(&scene, &camera);
-            let params = PsmParams { variant, map_size: SIZE, ..Default::default() };
+            let params = PsmParams { variant, lookup, map_size: SIZE, ..Default::default() };
             let (prepared, _) = Psm::new(params).prepare(&scene, &sun(direction), &camera, &gbuffer);
             let mut image = VisibilityImage::new(camera.width, camera.height);
             prepared.shade(&gbuffer, &mut image);
@@ -156,12 +158,17 @@ fn shadows_of_lids_are_their_projections() {
                 // caster may be lost where it is cut into triangles.
                 let tan = direction.with_y(0.0).length() / -direction.y;
                 let lost = 2.0 * texel * (1.0 + tan) > 0.4 * (1.0 + tan * tan).sqrt();
-                if depth.abs() > texel && !lost {
+                let (edge, lost) = match lookup {
+                    Lookup::Texel => (texel, lost),
+                    // Whatever the texels, but for the rounding of positions: as `plane_tolerance` and `view_tolerance` have it.
+                    Lookup::Surface => ((34.0 + gbuffer.depth[pixel]) / 524_288.0, false),
+                };
+                if depth.abs() > edge && !lost {
                     let expected = if depth > 0.0 { 0.0 } else { 1.0 };
                     assert_eq!(
                         image.values[pixel],
                         expected,
-                        "{variant:?}, {direction}, at {p}: {depth} off the edge, texel {texel}, d {}",
+                        "{variant:?}, {lookup:?}, {direction}, at {p}: {depth} off the edge, texel {texel}, d {}",
                         view.texel_in_pixels(SIZE, &frame, p.as_dvec3(), DVec3::Y)
                     );
                     compared += 1;
