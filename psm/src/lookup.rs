@@ -1,6 +1,15 @@
-//! One comparison a receiver, by the questions of [`gnomon_shadow_map::receiver_plane`]: they need no bias, and no
-//! depth. A texel keeps the triangle that the light sees at its centre; the point is where the texel's ray meets that
-//! triangle's plane, so nothing here knows how depths are spread in a warped map. What the paper leaves to the user,
+//! Whether a receiver is in shadow by what the texels around it keep: the triangles that the light sees at their centres.
+//!
+//! # Surfaces
+//! What a texel keeps is known at its centre, and the receiver lies beside that. So the surface that each of the nine texels around
+//! shows is followed to the receiver's own ray ([`follow`](crate::follow)): a triangle that the ray meets before the light shadows
+//! it, beyond any doubt, and outlines of shadows are the mesh's. What is left to texels is what none of their centres sees. Where
+//! the receiver's own texel shows a surface that ends before its ray, that surface is no shadow, but it may be a leaf of many
+//! of which the next goes unseen: if all of it would find room within the nine texels, most of them decide.
+//!
+//! # One texel
+//! By the questions of [`gnomon_shadow_map::receiver_plane`]: they need no bias, and no depth. The stored point is where the texel's
+//! ray meets its triangle's plane, so nothing here knows how depths are spread in a warped map. What the paper leaves to the user,
 //! an offset in post-perspective depth, does not exist.
 
 use glam::{DVec3, Vec3};
