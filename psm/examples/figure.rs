@@ -1,12 +1,12 @@
 //! Draws the paper's figures in kind: chess under a spot (figure 1), street and forest under the sun (figures 8 to 10). From left
-//! to right a uniform map, a perspective one of the same size, and one shadow ray a pixel.
+//! to right a uniform map, a perspective one of the same size, both looked up by texels so that these show, and one shadow ray a pixel.
 //!
 //! `cargo run --release -p gnomon-psm --example figure -- SCENE MAP_SIZE FILE.png`
 
 use std::error::Error;
 use std::path::Path;
 
-use gnomon_psm::{Psm, PsmParams, Variant};
+use gnomon_psm::{Lookup, Psm, PsmParams, Variant};
 use scene_core::bvh::Bvh;
 use scene_core::io::write;
 use scene_core::reference::{self, ReferenceSettings, no_progress};
@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         reference::reference(&setup.scene, &casters, &light, &gbuffer, &settings, &no_progress)?.visibility;
     let valid = reference::valid_pixels(&gbuffer, &light);
     let by = |variant| {
-        let params = PsmParams { variant, map_size, ..Default::default() };
+        let params = PsmParams { variant, lookup: Lookup::Texel, map_size, ..Default::default() };
         let (prepared, _) = Psm::new(params).prepare(&setup.scene, &light, &camera, &gbuffer);
         let mut image = VisibilityImage::new(camera.width, camera.height);
         prepared.shade(&gbuffer, &mut image);
