@@ -125,24 +125,24 @@ impl PsmMap {
     #[inline]
     pub fn shadows(&self, seen: &Surroundings<'_>, receiver: &Receiver, texel: [usize; 2]) -> bool {
         let asked = (receiver.point, receiver.tolerance);
-        self.shadows_by(seen, asked, texel, |texel| self.texel_shadows(seen, receiver, texel))
+        self.shadows_by(seen, asked, texel, |texel| self.shadowing(seen, receiver, texel))
     }
 
     /// Whether a free point, which has no surface of its own, is in shadow.
     pub fn shadows_free(&self, seen: &Surroundings<'_>, asked: (Vec3, f32), texel: [usize; 2]) -> bool {
-        self.shadows_by(seen, asked, texel, |texel| self.texel_shadows_free(seen, asked, texel))
+        self.shadows_by(seen, asked, texel, |texel| self.shadowing_free(seen, asked, texel))
     }
 
-    /// The order of questions for both. `ask` asks one texel.
+    /// The order of questions for both. `ask` asks one texel for what shadows.
     #[inline]
     fn shadows_by(
         &self,
         seen: &Surroundings<'_>,
         asked: (Vec3, f32),
         texel: [usize; 2],
-        ask: impl Fn([usize; 2]) -> bool,
+        ask: impl Fn([usize; 2]) -> Option<Occluder>,
     ) -> bool {
-        let Some(surfaces) = seen.surfaces else { return ask(texel) };
+        let Some(surfaces) = seen.surfaces else { return ask(texel).is_some() };
         let own = self.triangle(texel);
         let own_leads = match own {
             GBuffer::NOTHING => Followed::InFront,
@@ -163,19 +163,19 @@ impl PsmMap {
             }
         }
         // Nothing that is seen shadows it but, maybe, what goes on unseen between the texels.
-        if own_leads == Followed::InFront || !ask(texel) {
+        if own_leads == Followed::InFront {
             return false;
         }
+        let Some(occluder) = ask(texel) else { return false };
         if own_leads == Followed::Lost {
             return true;
         }
-        let Some(occluder) = self.occluder(seen, asked.0, texel) else { return false };
         // A surface larger than the texels around ends where it is seen to end. One that is smaller may have others beside it, as leaves
         // have, of which no texel's centre sees all: then the texels are asked how many of them are dark.
         if surfaces.of(own as usize).extent >= 3.0 * occluder.texel {
             return false;
         }
-        let dark = AROUND.iter().filter(|around| ask(self.beside(texel, **around))).count();
+        let dark = AROUND.iter().filter(|around| ask(self.beside(texel, **around)).is_some()).count();
         // With its own texel most of nine.
         dark >= AROUND.len() / 2
     }
@@ -193,11 +193,11 @@ impl PsmMap {
         [0, 1].map(|i| texel[i].saturating_add_signed(around[i] as isize).min(last))
     }
 
-    /// Whether what `texel` keeps shadows `receiver`.
+    /// What `texel` keeps, if it shadows `receiver`.
     #[inline]
-    fn texel_shadows(&self, seen: &Surroundings<'_>, receiver: &Receiver, texel: [usize; 2]) -> bool {
+    fn shadowing(&self, seen: &Surroundings<'_>, receiver: &Receiver, texel: [usize; 2]) -> Option<Occluder> {
         let Receiver { point, normal, tolerance, .. } = *receiver;
-        self.occluder(seen, point, texel).is_some_and(|occluder| {
+        self.occluder(seen, point, texel).filter(|occluder| {
             let corners = seen.scene.corners(occluder.triangle);
             let snapping = occluder.texel * DEPTH_POSITION_ERROR;
             rises_above(occluder.point, point, normal, tolerance + snapping)
@@ -209,14 +209,14 @@ impl PsmMap {
     }
 
     /// The same for a free point: the stored point is nearer to the light, and the point lies behind its triangle.
-    fn texel_shadows_free(
+    fn shadowing_free(
         &self,
         seen: &Surroundings<'_>,
         (point, tolerance): (Vec3, f32),
         texel: [usize; 2],
-    ) -> bool {
+    ) -> Option<Occluder> {
         let (to_light, _) = seen.light.ray_from(point);
-        self.occluder(seen, point, texel).is_some_and(|occluder| {
+        self.occluder(seen, point, texel).filter(|occluder| {
             (occluder.point - point).dot(to_light) > 0.0
                 && is_behind(seen.scene.corners(occluder.triangle), point, seen.light, tolerance)
         })
