@@ -48,7 +48,7 @@ fn any_technique_can_be_the_source() {
         let (prepared, _) = technique.prepare(&query).expect("supported");
         let mut image = VisibilityImage::new(96, 64);
         prepared.shade(&setup.camera, &gbuffer, &mut image).expect("sizes match");
-        image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
+        image.bits()
     };
     let source = |map_size: u32| -> ContactHardening {
         let hard = ShadowMap::new(ShadowMapParams { map_size, ..Default::default() });

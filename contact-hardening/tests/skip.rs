@@ -26,7 +26,7 @@ fn skipping_never_changes_the_image() {
                     let (prepared, _) = ContactHardening::new(params).prepare(&query).expect("own map");
                     let mut image = VisibilityImage::new(gbuffer.width, gbuffer.height);
                     let report = prepared.shade(&setup.camera, &gbuffer, &mut image).expect("sizes match");
-                    let bits: Vec<u32> = image.values.iter().map(|v| v.to_bits()).collect();
+                    let bits = image.bits();
                     (bits, report.skipped.values().sum::<u64>())
                 };
                 let ((with, left_out), (without, none)) = (image(true), image(false));

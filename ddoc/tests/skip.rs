@@ -11,7 +11,7 @@ fn differences(scene: &Scene, light: &Light, gbuffer: &GBuffer, params: DdocPara
         let (prepared, _) = Ddoc::new(params).prepare(scene, light).expect("few triangles");
         let mut image = VisibilityImage::new(gbuffer.width, gbuffer.height);
         let report = prepared.shade(gbuffer, &mut image);
-        let bits: Vec<u32> = image.values.iter().map(|v| v.to_bits()).collect();
+        let bits = image.bits();
         (bits, report.skipped.values().sum::<u64>())
     };
     let ((with, left_out), (without, none)) = (image(true), image(false));

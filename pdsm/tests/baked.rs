@@ -23,10 +23,6 @@ fn shade(pdsm: &gnomon_pdsm::PreparedPdsm<'_>, setup: &SceneSetup) -> Visibility
     image
 }
 
-fn bits(image: &VisibilityImage) -> Vec<u32> {
-    image.values.iter().map(|v| v.to_bits()).collect()
-}
-
 #[test]
 fn a_file_gives_the_image_it_was_baked_from() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -43,7 +39,7 @@ fn a_file_gives_the_image_it_was_baked_from() {
                 let read = Baked::read(&path).expect("read");
                 assert_eq!((read.params(), read.light()), (&params, light));
                 let (prepared, _) = read.prepare(&setup.scene, light).expect("the same scene");
-                assert_eq!(bits(&shade(&prepared, &setup)), bits(&shade(&built, &setup)), "{name}");
+                assert_eq!(shade(&prepared, &setup).bits(), shade(&built, &setup).bits(), "{name}");
                 assert_eq!(
                     std::fs::read_dir(folder.path()).expect("a folder").count(),
                     1,

@@ -7,7 +7,7 @@ use gnomon_pdsm::gpu::PdsmOnGpu;
 use gnomon_pdsm::{Pdsm, PdsmParams, Precision};
 use scene_core::gpu::headless::VISIBILITY_FORMAT;
 use scene_core::gpu::{Gpu, HeadlessError, HeadlessRun, testing};
-use scene_core::{GBuffer, Light, SceneSetup, VisibilityImage, raster, scenes};
+use scene_core::{GBuffer, Light, SceneSetup, raster, scenes};
 
 fn params() -> PdsmParams {
     PdsmParams { views: 16, map_size: 256, pdsm_size: 256, ..Default::default() }
@@ -37,10 +37,6 @@ fn run(
     testing::run_over(gpu, gbuffer, (&setup.scene, &setup.camera, light), pdsm)
 }
 
-fn bits(image: &VisibilityImage) -> Vec<u32> {
-    image.values.iter().map(|value| value.to_bits()).collect()
-}
-
 /// Lights outside and amid the casters.
 fn lights(setup: &SceneSetup) -> [Light; 2] {
     let bounds = setup.scene.bounds();
@@ -67,7 +63,7 @@ fn pages_hold_what_buffers_hold() {
                 assert!(bytes > LIMIT || light != inside, "{name}, {light:?}: {bytes} bytes");
                 let whole = run(&gpu, &seen, &light, &mut whole).unwrap();
                 let paged = run(&small, &seen, &light, &mut paged).unwrap();
-                assert!(bits(&whole.visibility) == bits(&paged.visibility), "{name}, {params:?}, {light:?}");
+                assert!(whole.visibility.bits() == paged.visibility.bits(), "{name}, {params:?}, {light:?}");
             }
         }
     }
@@ -84,7 +80,7 @@ fn pages_hold_baked_functions() {
             let mut pdsm = PdsmOnGpu::from_baked(&gpu.device, baked.clone(), VISIBILITY_FORMAT);
             run(gpu, &seen, &light, &mut pdsm).unwrap()
         });
-        assert!(bits(&whole.visibility) == bits(&paged.visibility), "{light:?}");
+        assert!(whole.visibility.bits() == paged.visibility.bits(), "{light:?}");
     }
 }
 

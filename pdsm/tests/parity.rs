@@ -216,9 +216,10 @@ fn it_is_reused_from_light_to_light() {
     let mut pdsm = PdsmOnGpu::new(&gpu.device, PARAMS, VISIBILITY_FORMAT);
     let other = Light::Point { position: setup.scene.bounds().center() };
     let runs = [other, setup.lights[0], other].map(|light| view.run(&mut pdsm, &light, &gbuffer).unwrap());
-    let bits =
-        |run: &HeadlessRun| -> Vec<u32> { run.visibility.values.iter().map(|v| v.to_bits()).collect() };
-    assert!(bits(&runs[0]) == bits(&runs[2]) && bits(&runs[0]) != bits(&runs[1]));
+    assert!(
+        runs[0].visibility.bits() == runs[2].visibility.bits()
+            && runs[0].visibility.bits() != runs[1].visibility.bits()
+    );
     assert!(runs[1].report.stages_ms.contains_key("prepare.upload"), "{:?}", runs[1].report);
 
     let camera = Camera { width: 16, height: 16, ..setup.camera };

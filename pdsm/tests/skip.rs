@@ -16,7 +16,7 @@ fn skipping_never_changes_the_image() {
             let mut image = VisibilityImage::new(setup.camera.width, setup.camera.height);
             let shaded = pdsm.shade(&gbuffer, &mut image);
             (
-                image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>(),
+                image.bits(),
                 report.skipped["map rows without casters"],
                 shaded.skipped["lookups before all shadows"],
                 shaded.skipped["lookups of what faces away"],

@@ -49,7 +49,7 @@ fn culling(stations: &[String]) -> Result<(), Box<dyn Error>> {
                 let start = Instant::now();
                 let (_, work) = prepared.shade_and_count(&gbuffer, &mut image);
                 took.push(start.elapsed().as_secs_f64() * 1e3);
-                images.push(image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+                images.push(image.bits());
                 edges = prepared.wedges().map_or(0, |wedges| wedges.wedges.len());
                 each = took[took.len() - 1] * 1e3 / work.penumbra.max(1) as f64;
             }

@@ -191,7 +191,7 @@ fn lists_without_room_change_no_pixel() {
         let params = WedgeParams { variant, rays: false, ..Default::default() };
         let images = [64 << 20, 1 << 8, 0].map(|bytes| {
             let image = on_gpu(&gpu, &case, &gbuffer, params, bytes).0;
-            image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
+            image.bits()
         });
         assert!(images[0] == images[1] && images[0] == images[2], "{variant:?}");
     }

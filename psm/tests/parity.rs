@@ -261,8 +261,10 @@ fn it_is_reused_from_frame_to_frame() {
     let mut technique = PsmOnGpu::new(&gpu.device, params(Variant::Auto), VISIBILITY_FORMAT).unwrap();
     let cube = Light::Point { position: setup.scene.bounds().center() };
     let runs = [cube, setup.lights[0], cube].map(|light| view.run(&mut technique, &light, &gbuffer).unwrap());
-    let bits = |run: &HeadlessRun| run.visibility.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-    assert!(bits(&runs[0]) == bits(&runs[2]) && bits(&runs[0]) != bits(&runs[1]));
+    assert!(
+        runs[0].visibility.bits() == runs[2].visibility.bits()
+            && runs[0].visibility.bits() != runs[1].visibility.bits()
+    );
     let stages = ["prepare.receivers", "prepare.views", "prepare.maps", "shade.lookup"];
     for stage in if gpu.has_timestamps() { &stages[..] } else { &["shade.wall"] } {
         assert!(runs[1].report.stages_ms.contains_key(*stage), "{stage}: {:?}", runs[1].report);

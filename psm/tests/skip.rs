@@ -31,7 +31,7 @@ fn skipping_changes_no_pixel() {
                     let mut image = VisibilityImage::new(camera.width, camera.height);
                     prepared.shade(&gbuffer, &mut image);
                     let count = report.skipped.get("caster triangles outside view").copied().unwrap_or(0);
-                    (image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), count)
+                    (image.bits(), count)
                 };
                 let ((with, count), (without, none)) = (image(true), image(false));
                 assert!(with == without, "{spec}, {light:?}, {variant:?}");

@@ -12,7 +12,7 @@ use std::time::Instant;
 use glam::Vec3;
 use gnomon_scene_core::bvh::Bvh;
 use gnomon_scene_core::light::LightPoint;
-use gnomon_scene_core::reference::{Occlusion, Reference, ReferenceSettings, no_progress, reference};
+use gnomon_scene_core::reference::{Occlusion, ReferenceSettings, no_progress, reference};
 use gnomon_scene_core::{SceneSetup, io, raster, scenes};
 
 /// Seconds this thread has spent on a processor, where the system tells: other programs do not disturb it.
@@ -60,9 +60,8 @@ fn row(name: &str, mut setup: SceneSetup, width: u32) {
         }
     }
     let [Some(singly), Some(packets), Some(skipping)] = truths else { return };
-    let bits = |truth: &Reference| truth.visibility.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-    assert!(bits(&singly) == bits(&packets), "{name}: packets change nothing");
-    assert!(bits(&packets) == bits(&skipping), "{name}: leaving out changes nothing");
+    assert!(singly.visibility.bits() == packets.visibility.bits(), "{name}: packets change nothing");
+    assert!(packets.visibility.bits() == skipping.visibility.bits(), "{name}: leaving out changes nothing");
     let all = packets.work.sampled.max(1) as f64;
     let share = |count: u64| 100.0 * count as f64 / all;
     let partly = packets.visibility.values.iter().filter(|&&v| v > 0.0 && v < 1.0).count() as u64;

@@ -26,4 +26,9 @@ impl VisibilityImage {
         assert!(x < self.width && y < self.height, "pixel ({x}, {y}) is outside the image");
         self.values[y as usize * self.width as usize + x as usize]
     }
+
+    /// The bits of V of each pixel: equal only where images are the same to the last bit, NaN included.
+    pub fn bits(&self) -> Vec<u32> {
+        self.values.iter().map(|v| v.to_bits()).collect()
+    }
 }

@@ -14,15 +14,11 @@ fn truth(scene: &Scene, light: &Light, gbuffer: &GBuffer, skip: bool) -> Referen
     reference(scene, &Bvh::casters(scene), light, gbuffer, &settings, &no_progress).unwrap()
 }
 
-fn bits(truth: &Reference) -> Vec<u32> {
-    truth.visibility.values.iter().map(|v| v.to_bits()).collect()
-}
-
 /// The image with proofs, after comparing it with the one without.
 fn proved(what: &str, scene: &Scene, light: &Light, gbuffer: &GBuffer) -> Reference {
     let (plain, proved) = (truth(scene, light, gbuffer, false), truth(scene, light, gbuffer, true));
     assert_eq!(plain.work.proved_lit + plain.work.proved_dark, 0);
-    assert!(bits(&plain) == bits(&proved), "{what} under {light:?}");
+    assert!(plain.visibility.bits() == proved.visibility.bits(), "{what} under {light:?}");
     let work = proved.work;
     assert_eq!(work.proved_lit + work.proved_dark + work.sampled, plain.work.sampled, "{what}");
     assert!(work.rays <= plain.work.rays);

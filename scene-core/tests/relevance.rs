@@ -349,7 +349,7 @@ impl Frame {
             backdrops: told_apart(scene, light, 1e-4).backdrops.iter().map(|o| o.triangles.start).collect(),
             classes: classify_tiles(scene, &bvh, light, &gbuffer, &tiles),
             region: region.planes().to_vec(),
-            visibility: truth.visibility.values.iter().map(|v| v.to_bits()).collect(),
+            visibility: truth.visibility.bits(),
             gbuffer,
             tiles,
             chunks,

@@ -24,8 +24,7 @@ fn compare(scene: &Scene, light: &Light, camera: &Camera) -> [usize; 3] {
     let mut all = image.clone();
     AliasFree::new(scene, true).shade(light, &gbuffer, &mut image);
     AliasFree::new(scene, false).shade(light, &gbuffer, &mut all);
-    let bits = |image: &VisibilityImage| image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-    assert!(bits(&image) == bits(&all), "skipping changed the image");
+    assert!(image.bits() == all.bits(), "skipping changed the image");
     let settings = ReferenceSettings { skip: false, ..Default::default() };
     let truth = reference(scene, &Bvh::casters(scene), light, &gbuffer, &settings, &no_progress);
     let truth = truth.expect("never stopped").visibility;

@@ -193,10 +193,10 @@ fn it_is_reused_from_frame_to_frame() {
     for light in [cube, setup.lights[0], cube] {
         runs.push(view.run(&mut on_gpu, &light, &gbuffer).unwrap());
     }
-    let bits = |run: &scene_core::gpu::HeadlessRun| -> Vec<u32> {
-        run.visibility.values.iter().map(|v| v.to_bits()).collect()
-    };
-    assert!(bits(&runs[0]) == bits(&runs[2]) && bits(&runs[0]) != bits(&runs[1]));
+    assert!(
+        runs[0].visibility.bits() == runs[2].visibility.bits()
+            && runs[0].visibility.bits() != runs[1].visibility.bits()
+    );
     // The faces stay when a light needs fewer.
     assert_eq!(runs[1].report.bytes, runs[0].report.bytes);
     for stage in ["prepare.views", if gpu.has_timestamps() { "prepare.maps" } else { "prepare.wall" }] {

@@ -24,10 +24,6 @@ fn shade(
     (image, report)
 }
 
-fn bits(image: &VisibilityImage) -> Vec<u32> {
-    image.values.iter().map(|v| v.to_bits()).collect()
-}
-
 /// Root mean square errors against ground truth as points and texels grow together.
 fn errors_of_multi_view(spec: &str) -> Vec<f64> {
     let setup = scenes::build(spec, 0.0).expect("a built-in scene");
@@ -63,7 +59,7 @@ fn one_view_of_a_point_is_the_hard_map() {
     let gbuffer = raster::render_gbuffer(&setup.scene, &setup.camera.with_size(128, 128));
     let of =
         |variant| shade(&setup.scene, &light, &gbuffer, ShadowMapParams { variant, ..Default::default() }).0;
-    assert!(bits(&of(Variant::MultiView)) == bits(&of(Variant::Hard)));
+    assert!(of(Variant::MultiView).bits() == of(Variant::Hard).bits());
 }
 
 /// The scene's own light, a sun and a light among the casters; from the scene's camera and from close up.
@@ -83,7 +79,7 @@ fn skipping_changes_nothing_and_is_counted() {
                 let (on, report) = shade(&setup.scene, &light, &gbuffer, params);
                 let (off, none) =
                     shade(&setup.scene, &light, &gbuffer, ShadowMapParams { skip: false, ..params });
-                assert!(bits(&on) == bits(&off), "{spec}, {light:?}, {variant:?}");
+                assert!(on.bits() == off.bits(), "{spec}, {light:?}, {variant:?}");
                 assert!(!none.skipped.contains_key("caster triangles outside view"));
                 left_out += report.skipped.get("caster triangles outside view").copied().unwrap_or(0);
             }

@@ -32,7 +32,7 @@ fn compare(scene: &Scene, light: &Light, params: ShadowMapParams, count: u64) ->
         let mut free = [f32::NAN; 8];
         part.visibility_at(&scene.bounds().corners(), &mut free);
         assert!(free.iter().all(|v| (0.0..=1.0).contains(v)), "{:?}, {light:?}: {free:?}", params.variant);
-        let [full, part] = images.map(|i| i.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+        let [full, part] = images.map(|i| i.bits());
         let wrong = full.iter().zip(&part).filter(|(a, b)| a != b).count();
         assert_eq!(wrong, 0, "{:?}, {light:?}, view {seed}: {camera:?}", params.variant);
         dark += full.iter().filter(|&&v| v == 0).count();
@@ -137,7 +137,7 @@ fn coarse_maps_are_looked_up_together() {
                     let mut images = [(); 2].map(|()| VisibilityImage::new(gbuffer.width, gbuffer.height));
                     let report = on.shade(gbuffer, &mut images[0]);
                     off.shade(gbuffer, &mut images[1]);
-                    let [a, b] = images.map(|i| i.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+                    let [a, b] = images.map(|i| i.bits());
                     let wrong = a.iter().zip(&b).filter(|(a, b)| a != b).count();
                     assert_eq!(wrong, 0, "{spec}, {light:?}, {params:?}");
                     let skipped = |what| report.skipped.get(what).copied().unwrap_or(0);
@@ -173,7 +173,7 @@ fn ground_seen_close_up() {
             let (maps, _) = technique.prepare(&setup.scene, &setup.lights[0]);
             let mut image = VisibilityImage::new(camera.width, camera.height);
             maps.shade(&gbuffer, &mut image);
-            image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
+            image.bits()
         });
         assert_eq!(on.iter().zip(&off).filter(|(a, b)| a != b).count(), 0, "{params:?}");
     }

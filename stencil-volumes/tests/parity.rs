@@ -167,7 +167,7 @@ fn lists_without_room_change_no_pixel() {
         let StencilVolumesOnGpu::Volumes(volumes) = &mut on_gpu else { unreachable!("the default variant") };
         volumes.set_list_bytes(bytes);
         let run = view.run(&mut on_gpu, &light, &gbuffer).unwrap();
-        images.push(run.visibility.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+        images.push(run.visibility.bits());
     }
     assert!(images[0] == images[1] && images[2] == images[3] && images[0] != images[2]);
 }
@@ -239,7 +239,7 @@ fn skipping_changes_no_pixel() {
                 };
                 volumes.set_skips(skips);
                 let run = view.run(&mut technique, &light, &gbuffer).unwrap();
-                let bits: Vec<u32> = run.visibility.values.iter().map(|v| v.to_bits()).collect();
+                let bits = run.visibility.bits();
                 assert!(first.get_or_insert_with(|| bits.clone()) == &bits, "{name}, {light:?}, {kind}");
                 println!(
                     "{name} {}, {kind}: {:?} {:?}",

@@ -19,7 +19,7 @@ fn compare(scene: &Scene, light: &Light, camera: &Camera, variant: Variant) -> R
             let mut image = VisibilityImage::new(camera.width, camera.height);
             report.merge(&prepared.shade(&gbuffer, &mut image));
             kept = report;
-            let bits: Vec<u32> = image.values.iter().map(|v| v.to_bits()).collect();
+            let bits = image.bits();
             let first = first.get_or_insert_with(|| bits.clone());
             let wrong = bits.iter().zip(first).filter(|(a, b)| a != b).count();
             assert_eq!(wrong, 0, "{light:?}, {variant:?}, rays {rays}, {name}");

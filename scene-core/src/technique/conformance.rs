@@ -221,8 +221,7 @@ pub fn assert_same_in_two_pieces(technique: &dyn ShadowTechnique) {
     for light in [setup.lights[0], Light::Sphere { center: position, radius }] {
         let query = ShadowQuery { scene: &scene, light: &light, camera: &camera };
         let Some([whole, in_pieces]) = whole_and_in_pieces(technique, &query, PIECE) else { return };
-        let bits = |image: &VisibilityImage| image.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-        assert!(bits(&whole) == bits(&in_pieces), "{} under a {}", technique.name(), light.kind());
+        assert!(whole.bits() == in_pieces.bits(), "{} under a {}", technique.name(), light.kind());
         assert!(in_pieces.values.contains(&0.0) && in_pieces.values.contains(&1.0), "{}", technique.name());
     }
 }
