@@ -136,7 +136,7 @@ impl PenumbraWedgesOnGpu {
         let mut report = Report::default();
         let device = recorder.device;
         self.prepared = None;
-        let kept = self.tables.take().filter(|tables| tables.are_of(&query.scene));
+        let kept = self.tables.take().filter(|tables| tables.made_for.are_of(&query.scene));
         let tables = match kept {
             Some(tables) => tables,
             None => report.time("prepare.edges", |_| new_tables(device, query, self.params.variant))?,

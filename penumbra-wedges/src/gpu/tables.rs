@@ -1,7 +1,9 @@
 //! What lives on the device as long as the scene does: edges with their faces, what each triangle is, the casters' trees.
 
 use scene_core::Scene;
-use scene_core::gpu::{CasterTrees, GpuError, GpuScene, binding_limit, storage_buffer, table_buffer};
+use scene_core::gpu::{
+    CasterTrees, GeometryBuffers, GpuError, GpuScene, binding_limit, storage_buffer, table_buffer,
+};
 
 use crate::Variant;
 use crate::bodies::FaceKind;
@@ -23,8 +25,8 @@ pub enum TablesError {
 /// Buffers that depend on the geometry alone.
 #[derive(Debug)]
 pub struct Tables {
-    /// The scene's buffers they were made for.
-    made_for: [wgpu::Buffer; 2],
+    /// What they were made from.
+    pub made_for: GeometryBuffers,
     /// Four words an edge: two vertices; twice where its incidences start, and 1 if its two faces lie in one plane on both
     /// sides of it; how many incidences. Passes take it in [`pieces`](scene_core::gpu::pieces), but for those of `interpolated`, which find
     /// neighbours in it.
@@ -83,7 +85,7 @@ impl Tables {
         }
         let buffer = |what, bytes| storage_buffer(device, what, bytes);
         Ok(Self {
-            made_for: [scene.positions.clone(), scene.triangles.clone()],
+            made_for: GeometryBuffers::new(scene),
             edges: if variant == Variant::Interpolated {
                 buffer("edges", bytemuck::cast_slice(&edges))?
             } else {
@@ -101,11 +103,6 @@ impl Tables {
             all_nodes: trees.nodes.len() as u32,
             masked: casters.masked().map(|object| object.name.clone()),
         })
-    }
-
-    /// Whether they are those of `scene`.
-    pub fn are_of(&self, scene: &GpuScene<'_>) -> bool {
-        self.made_for[0] == *scene.positions && self.made_for[1] == *scene.triangles
     }
 
     /// Bytes held on the device.

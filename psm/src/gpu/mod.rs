@@ -30,9 +30,9 @@ use std::ops::Range;
 use gnomon_shadow_map::receiver_plane::plane_tolerance;
 use scene_core::geometry::{SurfaceTriangle, Surfaces};
 use scene_core::gpu::{
-    Bound, ComputePass, DepthIds, DepthLayers, DepthPass, DepthTarget, GpuError, GpuGBuffer, GpuScene,
-    GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings, SceneGroups, SceneHandles,
-    VisibilityPass, VisibilityPassParts, WorkBuffer, WrittenProjection, binding, binding_limit,
+    Bound, ComputePass, DepthIds, DepthLayers, DepthPass, DepthTarget, GeometryBuffers, GpuError, GpuGBuffer,
+    GpuScene, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings, SceneGroups,
+    SceneHandles, VisibilityPass, VisibilityPassParts, WorkBuffer, WrittenProjection, binding, binding_limit,
     storage_buffer,
 };
 use scene_core::technique::{Params as _, TechniqueError};
@@ -105,8 +105,8 @@ struct Written {
 /// The surfaces of a scene; `None` where they are more than the device binds.
 #[derive(Debug)]
 struct HeldSurfaces {
-    /// The scene's buffers they were made for.
-    made_for: [wgpu::Buffer; 2],
+    /// What they were made from.
+    made_for: GeometryBuffers,
     buffer: Option<wgpu::Buffer>,
 }
 
@@ -118,12 +118,7 @@ impl HeldSurfaces {
         let upload = |surfaces: &Surfaces| {
             storage_buffer(device, "surfaces", bytemuck::cast_slice(surfaces.triangles())).ok()
         };
-        let made_for = [scene.positions.clone(), scene.triangles.clone()];
-        Self { made_for, buffer: surfaces.as_ref().and_then(upload) }
-    }
-
-    fn are_of(&self, scene: &GpuScene<'_>) -> bool {
-        self.made_for[0] == *scene.positions && self.made_for[1] == *scene.triangles
+        Self { made_for: GeometryBuffers::new(scene), buffer: surfaces.as_ref().and_then(upload) }
     }
 }
 
@@ -252,7 +247,7 @@ impl PsmOnGpu {
         report: &mut Report,
     ) -> Option<wgpu::Buffer> {
         let geometry = scene.geometry.filter(|_| self.params.lookup == Lookup::Surface)?;
-        let kept = self.surfaces.take().filter(|surfaces| surfaces.are_of(scene));
+        let kept = self.surfaces.take().filter(|surfaces| surfaces.made_for.are_of(scene));
         let surfaces = kept.unwrap_or_else(|| {
             report.time("prepare.surfaces", |_| HeldSurfaces::new(device, scene, geometry))
         });

@@ -66,7 +66,9 @@ pub use layers::DepthLayers;
 pub use layout::{CameraUniform, DepthUniform, LightUniform};
 pub use pages::{Pages, Readers};
 pub use receivers::Receivers;
-pub use scene::{GpuCutouts, GpuObject, GpuScene, SceneBindings, SceneBuffers, SceneGroups, SceneHandles};
+pub use scene::{
+    GeometryBuffers, GpuCutouts, GpuObject, GpuScene, SceneBindings, SceneBuffers, SceneGroups, SceneHandles,
+};
 pub use storage::{binding_limit, filled_buffer, pieces, storage_buffer, table_buffer};
 pub use technique::{GpuShadowQuery, GpuShadowTechnique};
 pub use timing::{Recorder, StageSpan, StageTimer};

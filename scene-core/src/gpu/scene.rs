@@ -116,6 +116,25 @@ impl SceneHandles {
     }
 }
 
+/// The buffers that something was made from: kept from frame to frame it holds for these, and is made anew for others.
+#[derive(Clone, Debug)]
+pub struct GeometryBuffers {
+    positions: wgpu::Buffer,
+    triangles: wgpu::Buffer,
+}
+
+impl GeometryBuffers {
+    /// Those of `scene`.
+    pub fn new(scene: &GpuScene<'_>) -> Self {
+        Self { positions: scene.positions.clone(), triangles: scene.triangles.clone() }
+    }
+
+    /// Whether they are those of `scene`, too.
+    pub fn are_of(&self, scene: &GpuScene<'_>) -> bool {
+        self.positions == *scene.positions && self.triangles == *scene.triangles
+    }
+}
+
 /// The faces of a box.
 fn box_mesh(bounds: Aabb) -> TriangleMesh {
     // Bit 0 of a corner is x, bit 1 y, bit 2 z.

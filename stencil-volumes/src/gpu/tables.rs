@@ -3,7 +3,9 @@
 use scene_core::Scene;
 use scene_core::bvh::Bvh;
 use scene_core::geometry::EdgeTopology;
-use scene_core::gpu::{CasterTrees, GpuError, GpuScene, binding_limit, storage_buffer, table_buffer};
+use scene_core::gpu::{
+    CasterTrees, GeometryBuffers, GpuError, GpuScene, binding_limit, storage_buffer, table_buffer,
+};
 
 use crate::error::VolumeError;
 
@@ -21,8 +23,8 @@ pub enum TablesError {
 /// Buffers that depend on the geometry alone.
 #[derive(Debug)]
 pub struct Tables {
-    /// The scene's buffers they were made for.
-    made_for: [wgpu::Buffer; 2],
+    /// What they were made from.
+    pub made_for: GeometryBuffers,
     /// Two vertices an edge. Passes take it and the next in [`pieces`](scene_core::gpu::pieces).
     pub vertices: wgpu::Buffer,
     /// Where an edge's incidences start, and one more.
@@ -69,7 +71,7 @@ impl Tables {
         }
         let buffer = |what, bytes| storage_buffer(device, what, bytes);
         Ok(Self {
-            made_for: [scene.positions.clone(), scene.triangles.clone()],
+            made_for: GeometryBuffers::new(scene),
             vertices: table_buffer(device, "vertices of edges", bytemuck::cast_slice(topology.vertices()))?,
             first: table_buffer(device, "faces of edges", bytemuck::cast_slice(&first))?,
             incident: buffer("faces of edges", bytemuck::cast_slice(&incident))?,
@@ -81,11 +83,6 @@ impl Tables {
             solid_nodes: trees.solid,
             all_nodes: trees.nodes.len() as u32,
         })
-    }
-
-    /// Whether they are those of `scene`.
-    pub fn are_of(&self, scene: &GpuScene<'_>) -> bool {
-        self.made_for[0] == *scene.positions && self.made_for[1] == *scene.triangles
     }
 
     /// Bytes held on the device.

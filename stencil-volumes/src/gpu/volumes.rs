@@ -211,7 +211,7 @@ impl VolumesOnGpu {
         let mut report = Report::default();
         let device = recorder.device;
         self.prepared = None;
-        let kept = self.tables.take().filter(|tables| tables.are_of(&query.scene));
+        let kept = self.tables.take().filter(|tables| tables.made_for.are_of(&query.scene));
         let tables = match kept {
             Some(tables) => tables,
             None => report.time("prepare.edges", |_| Tables::new(device, &query.scene, geometry)).map_err(
