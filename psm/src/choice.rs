@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-use crate::Variant;
 use crate::aliasing;
 use crate::light_image::LightImage;
 use crate::seen::Sample;
 use crate::view_frame::ViewFrame;
 use crate::warp::{Warp, Window};
+use crate::{Lookup, Variant};
 use crate::{fitted, lispsm, post_perspective, virtual_camera};
 
 /// How the texels of a map are spread.
@@ -44,6 +44,8 @@ pub struct Situation<'a> {
     pub near_shadows: &'a [Sample],
     /// Texels a side.
     pub map_size: u32,
+    /// How the map will be looked up.
+    pub lookup: Lookup,
 }
 
 impl Situation<'_> {
@@ -74,7 +76,8 @@ impl Situation<'_> {
         let errors = |warp: &Warp, window: &Window| {
             aliasing::expected_errors(warp, window, self.map_size, self.near_shadows)
         };
-        is_better(&errors(&self.image.warp, &even), &errors(&least, &self.window(&least)))
+        let gain = least_gain(self.lookup);
+        is_better(&errors(&self.image.warp, &even), &errors(&least, &self.window(&least)), gain)
             .then_some((Parametrisation::Fitted, least))
     }
 
@@ -89,18 +92,24 @@ impl Situation<'_> {
     }
 }
 
-/// The even map is kept for gains below this share: by so much error strays from the measure. It is the standard deviation of
-/// ln(wrong pixels / measure) over rows that are not those of the README: the example `fresh_views` prints it.
-const LEAST_GAIN: f64 = 1.0 / 6.0;
+/// The even map is kept for gains below this share, by what the example `fresh_views` prints of rows that are not those of the
+/// README. One texel's errors stray from the measure by as much: it is the standard deviation of ln(wrong pixels / measure). Those
+/// that surfaces leave fall faster than the measure, and of no row was any gain that it promised missed.
+pub(crate) fn least_gain(lookup: Lookup) -> f64 {
+    match lookup {
+        Lookup::Surface => 0.0,
+        Lookup::Texel => 1.0 / 6.0,
+    }
+}
 
 /// Whether a map with the errors `other` is better than the even one with those, sample by sample: if their mean is lower by
-/// [`LEAST_GAIN`] and by twice the standard error of the difference. What chance could have done is no reason to warp.
-fn is_better(even: &[f64], other: &[f64]) -> bool {
+/// the share `gain` and by twice the standard error of the difference. What chance could have done is no reason to warp.
+fn is_better(even: &[f64], other: &[f64], gain: f64) -> bool {
     let count = even.len() as f64;
     let gains = || even.iter().zip(other).map(|(a, b)| a - b);
     let mean = gains().sum::<f64>() / count;
     let variance = gains().map(|g| (g - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-    mean > 2.0 * (variance / count).sqrt() + LEAST_GAIN * even.iter().sum::<f64>() / count
+    mean > 2.0 * (variance / count).sqrt() + gain * even.iter().sum::<f64>() / count
 }
 
 #[cfg(test)]
@@ -110,13 +119,18 @@ mod tests {
     #[test]
     fn the_even_map_is_kept_unless_another_can_be_relied_on_to_be_better() {
         let even = [4.0, 4.0, 5.0, 3.0, 4.0];
-        assert!(is_better(&even, &[2.0, 2.1, 2.5, 1.5, 2.0]));
-        // A gain too small to rely on; what chance could have done; worse.
-        assert!(!is_better(&even, &[3.9, 3.9, 4.9, 2.9, 3.9]));
-        assert!(!is_better(&even, &[9.0, 0.1, 9.0, 0.1, 0.1]));
-        assert!(!is_better(&even, &[9.0; 5]));
-        // Nothing to go by.
-        assert!(!is_better(&even, &[f64::NAN; 5]));
-        assert!(!is_better(&[], &[]));
+        for gain in [Lookup::Surface, Lookup::Texel].map(least_gain) {
+            let is_better = |other: &[f64]| is_better(&even, other, gain);
+            assert!(is_better(&[2.0, 2.1, 2.5, 1.5, 2.0]));
+            // What chance could have done; worse; nothing to go by.
+            assert!(!is_better(&[9.0, 0.1, 9.0, 0.1, 0.1]));
+            assert!(!is_better(&[9.0; 5]));
+            assert!(!is_better(&[f64::NAN; 5]));
+        }
+        // One texel's errors stray by more than this gain.
+        let slightly = [3.9, 3.9, 4.9, 2.9, 3.9];
+        assert!(is_better(&even, &slightly, least_gain(Lookup::Surface)));
+        assert!(!is_better(&even, &slightly, least_gain(Lookup::Texel)));
+        assert!(!is_better(&[], &[], 0.0));
     }
 }

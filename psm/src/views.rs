@@ -176,6 +176,7 @@ fn map_view(
         samples: &samples,
         near_shadows: &near_shadows,
         map_size: params.map_size,
+        lookup: params.lookup,
     };
     let (mut parametrisation, mut warp) = situation.chosen(params.variant);
     let fit = |warp: &Warp| {
