@@ -17,7 +17,7 @@ use crate::physical::{Physical, Site};
 use crate::search::Blockers;
 
 /// Most distances that a point is asked at.
-const MAX_LAYERS: usize = 8;
+pub(crate) const MAX_LAYERS: usize = 8;
 
 /// What is known of a point of the light at some distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +50,7 @@ struct Layers {
 }
 
 /// Blockers within so much of a step are one layer: some thousand times what rounding tells apart where a caster is flat.
-const CLOSE: f32 = 1.0 / 1024.0;
+pub(crate) const CLOSE: f32 = 1.0 / 1024.0;
 
 impl Layers {
     fn new(which: Which, blockers: &Blockers, mean: f32) -> Self {

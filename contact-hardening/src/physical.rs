@@ -25,7 +25,7 @@ use crate::params::ContactHardeningParams;
 use crate::shadow_pyramid::{Extremes, PixelRect, ShadowPyramid};
 
 /// Cuts of the reach; more gain little.
-const CUTS: usize = 4;
+pub(crate) const CUTS: usize = 4;
 
 /// What pixels are answered from.
 #[derive(Clone, Copy, Debug)]

@@ -17,7 +17,7 @@ use crate::shadow_pyramid::PixelRect;
 
 /// How far from one to the next nearer distance it is, in 64ths: the golden section of 64, odd. Its multiples are spread evenly
 /// however many they are, and floats hold them exactly.
-const GOLDEN: usize = 39;
+pub(crate) const GOLDEN: usize = 39;
 
 /// Distances of the blockers in a cone, as D.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -26,10 +26,10 @@ use crate::lanes::LANES;
 use crate::tile_edges::dot;
 
 /// λ is lowered by this times 1 + λ².
-const TILT: f32 = 1.0 / 65_536.0;
+pub(crate) const TILT: f32 = 1.0 / 65_536.0;
 
 /// Planes are moved outwards by this share of the largest coordinate.
-const SHIFT: f32 = 1.0 / 131_072.0;
+pub(crate) const SHIFT: f32 = 1.0 / 131_072.0;
 
 /// The planes around a beam.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -81,7 +81,7 @@ pub enum Outline {
 
 /// The largest share of a hemisphere's half angle, as a sine, under which a round light is projected on a plane: closer
 /// to 90° its rim lies at infinity. At 0.999 the tangent is 22.
-const LARGEST_SIN: f64 = 0.999;
+pub(crate) const LARGEST_SIN: f64 = 0.999;
 
 /// The least height of a receiver over a flat light's plane, relative to the distances and half axes that span it. Sums of
 /// f64 are off by some 2⁻⁵⁰; 2⁻³⁰ leaves twenty bits for what is projected.

@@ -11,10 +11,10 @@ use crate::area_light::{AreaLight, LightShape};
 use crate::edges::CandidateEdge;
 
 /// Half-spaces.
-const PLANES: usize = 16;
+pub(crate) const PLANES: usize = 16;
 
 /// Those that touch both.
-const AROUND: usize = 14;
+pub(crate) const AROUND: usize = 14;
 
 /// Halvings of the angle by which a plane leans between box and light. Any angle bounds the shaft; after sixteen the plane is
 /// within 2⁻¹⁵ of the one that touches both.

@@ -9,10 +9,10 @@ use scene_core::light::LightPoint;
 use crate::seen::Sample;
 
 /// Less than this share of a box's diagonal is not passed through: what stands on a flat box, such as the ground, touches it.
-const LEAST: f64 = 1.0 / 1024.0;
+pub(crate) const LEAST: f64 = 1.0 / 1024.0;
 
 /// A ray along a side of a box is taken to lean by this share of its length, so that nothing is divided by zero.
-const LEAN: f64 = 1e-12;
+pub(crate) const LEAN: f64 = 1e-12;
 
 /// Those of `samples` whose ray to the light passes through one of `boxes`.
 pub fn near_shadows(boxes: &[Aabb], light: LightPoint, samples: &[Sample]) -> Vec<Sample> {

@@ -36,16 +36,16 @@ pub const CHOICES: usize = 64;
 pub const MOST_SAMPLES: usize = 128;
 
 /// The first step around the best; each of the [`ROUNDS`] tries this step and half of it, the next one begins with the half.
-const FIRST_STEP: f32 = 0.25;
+pub(crate) const FIRST_STEP: f32 = 0.25;
 
 /// Rounds after the first.
-const ROUNDS: u32 = 4;
+pub(crate) const ROUNDS: u32 = 4;
 
 /// What is less than this share better is the same: rounding decides nothing.
-const SAME: f32 = 1.0 / 1024.0;
+pub(crate) const SAME: f32 = 1.0 / 1024.0;
 
 /// The least w, as a share of the largest, over the receivers: more has no use that the samples could tell, and f32 holds places.
-const LEAST_W: f32 = 1.0 / 64.0;
+pub(crate) const LEAST_W: f32 = 1.0 / 64.0;
 
 /// The strengths of the perspective along the view that are tried first.
 const STRENGTHS: [f32; 4] = [0.0, 0.375, 0.625, 0.8125];

@@ -28,10 +28,10 @@ const LANES: usize = STEP as usize;
 
 /// Below this cosine between normal and light a surface receives next to nothing; errors are not counted there
 /// ([`scene_core::reference::valid_pixels`]), nor is aliasing.
-const GRAZING_COS: f32 = 0.05;
+pub(crate) const GRAZING_COS: f32 = 0.05;
 
 /// What depths are widened by: more than an f32 position is off (2⁻²⁴ of it).
-const SLACK: f32 = 1.0 / 262_144.0;
+pub(crate) const SLACK: f32 = 1.0 / 262_144.0;
 
 /// A surface point that the camera sees.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -21,7 +21,7 @@ pub(crate) const MARGIN: f64 = 1.0 / 65_536.0;
 
 /// The nearest caster a point light's map holds, as a share of its receiver's distance: reversed floating-point
 /// depth keeps its relative precision, so this may be as small as positions are exact (2⁻²⁰).
-const NEAR_FRACTION: f64 = 1.0 / 1_048_576.0;
+pub(crate) const NEAR_FRACTION: f64 = 1.0 / 1_048_576.0;
 
 /// Three linear forms on homogeneous world points (x, y, z, 1) that vanish at the light.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -17,7 +17,7 @@ use crate::view_casters::ViewNeeds;
 use crate::{ShadowMapParams, Variant};
 
 /// As far beside a map as matters: farther than any filter reaches, and columns and rows still fit into an `i32`.
-const FAR_TEXEL: f32 = 1e6;
+pub(crate) const FAR_TEXEL: f32 = 1e6;
 
 /// What the light sees through one view: depth and triangle a texel.
 #[derive(Clone, Debug)]

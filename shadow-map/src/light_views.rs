@@ -18,7 +18,7 @@ const MAX_TAN: f32 = 1.732;
 
 /// How far beyond the casters a view reaches, as a fraction of its extent: rounding must not push a caster's
 /// outermost vertex over the border (2⁻¹⁶ is 256 ulps of the largest coordinate).
-const MARGIN: f32 = 1.0 / 65_536.0;
+pub(crate) const MARGIN: f32 = 1.0 / 65_536.0;
 
 /// The nearest distance a perspective view sees, as a fraction of its farthest caster's. Reversed floating
 /// point depth keeps its relative precision at any distance, so this may be as small as positions themselves

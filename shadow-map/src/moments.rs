@@ -37,11 +37,11 @@ use crate::params::ShadowMapParams;
 use crate::texel_plane::TexelPlane;
 
 /// What keeps the matrix of moments positive, as a share of it: derived in the module's text.
-const MOMENT_BIAS: f32 = 1.0 / 65_536.0;
+pub(crate) const MOMENT_BIAS: f32 = 1.0 / 65_536.0;
 
 /// The spread that rounding alone gives to depths in [−1, 1]: 2⁻²¹, eight roundings. A receiver is compared two of them nearer to the
 /// light than it is: of a window that holds one depth, its own, nothing is before it then.
-const LEAST_SPREAD: f32 = 1.0 / 2_097_152.0;
+pub(crate) const LEAST_SPREAD: f32 = 1.0 / 2_097_152.0;
 
 /// The variant: blurred moments beside the maps.
 #[derive(Debug)]

@@ -13,7 +13,7 @@ use crate::light_views::Unprojection;
 use crate::taps::Taps;
 
 /// Cuts of the cone. Each makes the rectangle smaller or ends the search; more than this many gain little.
-const CUTS: usize = 4;
+pub(crate) const CUTS: usize = 4;
 
 /// Where blockers are looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]

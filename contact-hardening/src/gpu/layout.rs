@@ -174,9 +174,12 @@ pub struct PassUniform {
 #[cfg(test)]
 mod tests {
     use scene_core::assert_layout;
+    use scene_core::gpu::testing::assert_constants;
 
     use super::*;
-    use crate::gpu::shaders::{FINISH, MULTI_PASS, PYRAMID};
+    use crate::gpu::shaders::{FILTER, FINISH, MULTI_PASS, PYRAMID};
+    use crate::shadow_pyramid::TILE;
+    use crate::{filter, physical, search};
 
     #[test]
     fn layouts_are_those_of_the_shaders() {
@@ -211,6 +214,21 @@ mod tests {
         );
         assert_layout!(LevelUniform, PYRAMID, "Level", [pixels, tiles, below, start, start_below]);
         assert_layout!(PassUniform, MULTI_PASS, "Pass", [index, width, counts_down]);
+    }
+
+    #[test]
+    fn constants_are_those_of_the_shaders() {
+        assert_constants(
+            FILTER,
+            &[
+                ("search_GOLDEN", search::GOLDEN as f64),
+                ("filter_light_MAX_LAYERS", filter::MAX_LAYERS as f64),
+                ("filter_light_CLOSE", f64::from(filter::CLOSE)),
+                ("physical_CUTS", physical::CUTS as f64),
+                ("pyramid_TILE", TILE as f64),
+            ],
+        );
+        assert_constants(PYRAMID, &[("TILE", TILE as f64)]);
     }
 
     #[test]

@@ -14,13 +14,13 @@ use super::{MOST_TURNS, shaders};
 
 /// Entries that `shade.rest` looks at, or counts, in a round; points of the light that are counted at once; rounds beside those,
 /// for each time that the lists are gone through.
-const THREADS: u32 = 64;
+pub(super) const THREADS: u32 = 64;
 const POINTS_AT_ONCE: u32 = 64;
 const TURNS_BESIDE: u32 = 300;
 
 /// Pixels of a workgroup, and a side of them.
 const PIXELS: u32 = 64;
-const TILE: u32 = 8;
+pub(super) const TILE: u32 = 8;
 
 /// How many receivers a workgroup of `shade.rest` answers, if `longest` are the most edges and faces over one tile of each view.
 ///

@@ -203,9 +203,13 @@ fn edge_vectors(edges: &[Edge], first_outline: usize) -> Vec<[f32; 4]> {
 #[cfg(test)]
 mod tests {
     use scene_core::assert_layout;
+    use scene_core::gpu::testing::assert_constants;
+    use scene_core::raster::DEPTH_POSITION_ERROR;
 
     use super::*;
-    use crate::gpu::shaders::SHADE;
+    use crate::gpu::shaders::{GROUPS, REST, SHADE};
+    use crate::gpu::{LOOKED_AT_ONCE, MOST_TURNS, groups};
+    use crate::{beam, grid};
 
     #[test]
     fn layouts_are_those_of_the_shaders() {
@@ -247,6 +251,28 @@ mod tests {
                 xs,
                 ys
             ]
+        );
+    }
+
+    #[test]
+    fn constants_are_those_of_the_shaders() {
+        assert_constants(
+            GROUPS,
+            &[
+                ("TILE", f64::from(groups::TILE)),
+                ("MOST_TURNS", f64::from(MOST_TURNS)),
+                ("beam_TILT", f64::from(beam::TILT)),
+                ("beam_SHIFT", f64::from(beam::SHIFT)),
+                ("edges_RATIO", f64::from(grid::RATIO)),
+            ],
+        );
+        assert_constants(REST, &[("TILE", f64::from(groups::TILE)), ("THREADS", f64::from(groups::THREADS))]);
+        assert_constants(
+            SHADE,
+            &[
+                ("LOOKED_AT_ONCE", f64::from(LOOKED_AT_ONCE)),
+                ("before_center_DEPTH_POSITION_ERROR", f64::from(DEPTH_POSITION_ERROR)),
+            ],
         );
     }
 

@@ -143,9 +143,11 @@ pub struct PdsmUniform {
 #[cfg(test)]
 mod tests {
     use scene_core::assert_layout;
+    use scene_core::gpu::testing::assert_constants;
 
     use super::*;
     use crate::gpu::shaders::SHADE;
+    use crate::lookup;
 
     #[test]
     fn layouts_are_those_of_the_shaders() {
@@ -180,5 +182,13 @@ mod tests {
             ]
         );
         assert_layout!(PdsmUniform, SHADE, "Pdsm", [windows, count, still, tolerance, radius]);
+    }
+
+    #[test]
+    fn constants_are_those_of_the_shaders() {
+        assert_constants(
+            SHADE,
+            &[("READ_DISTANCE", f64::from(lookup::READ_DISTANCE)), ("T_ERROR", f64::from(lookup::T_ERROR))],
+        );
     }
 }

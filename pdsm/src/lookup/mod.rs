@@ -65,7 +65,7 @@ impl Add for Skipped {
 /// Half the diagonal way from a texel's middle to its corner, in texels along each axis, and what the drawing of maps
 /// adds (the rasteriser of scene-core half as much): how far the place whose depth a texel holds may be from the ray that
 /// reads it.
-const READ_DISTANCE: f32 = 0.5 + POSITION_ERROR;
+pub(crate) const READ_DISTANCE: f32 = 0.5 + POSITION_ERROR;
 
 /// What t may be off, relative to |t| + |1 − t|, between a receiver and the map's point of the same place: with u = 2⁻²⁴
 /// the receiver's t is off by 3 u of F/z = 1 − t and u of t, the map's depth by 10 u of its own largest

@@ -99,9 +99,12 @@ impl WedgesUniform {
 #[cfg(test)]
 mod tests {
     use scene_core::assert_layout;
+    use scene_core::gpu::testing::assert_constants;
 
     use super::*;
-    use crate::gpu::shaders::FACING;
+    use crate::gpu::BLOCK;
+    use crate::gpu::shaders::{BLOCKS, EXACT, FACING};
+    use crate::{area_light, cpu, shaft};
 
     #[test]
     fn layouts_are_those_of_the_shaders() {
@@ -129,5 +132,19 @@ mod tests {
                 seeds
             ]
         );
+    }
+
+    #[test]
+    fn constants_are_those_of_the_shaders() {
+        assert_constants(
+            EXACT,
+            &[
+                ("area_light_LARGEST_SIN", area_light::LARGEST_SIN),
+                ("wedges_TILE", cpu::TILE as f64),
+                ("shaft_PLANES", shaft::PLANES as f64),
+                ("shaft_AROUND", shaft::AROUND as f64),
+            ],
+        );
+        assert_constants(BLOCKS, &[("wedges_BLOCK", BLOCK as f64)]);
     }
 }

@@ -190,11 +190,15 @@ pub const PROJECTION_STRIDE: u64 = 256;
 
 #[cfg(test)]
 mod tests {
+    use scene_core::GBuffer;
     use scene_core::assert_layout;
-    use scene_core::gpu::testing::struct_layout;
+    use scene_core::geometry::NO_TRIANGLE;
+    use scene_core::gpu::testing::{assert_constants, struct_layout};
+    use scene_core::raster::DEPTH_POSITION_ERROR;
 
     use super::*;
     use crate::gpu::shaders::{CHOICE, LOOKUP, SEEN, VIEWS};
+    use crate::{Lookup, caster_boxes, choice, fitted, follow, seen, virtual_camera};
 
     #[test]
     fn layouts_are_those_of_the_shaders() {
@@ -214,5 +218,43 @@ mod tests {
         assert_layout!(ViewOnGpu, VIEWS, "View", [ndc, parametrisation, shift, measure]);
         assert_eq!(struct_layout(SEEN, "Tile").1 as u64, TILE_BYTES);
         assert_eq!(struct_layout(SEEN, "Choice").1 as u64, CHOICE_BYTES);
+    }
+
+    #[test]
+    fn constants_are_those_of_the_shaders() {
+        assert_constants(
+            SEEN,
+            &[("GRAZING_COS", f64::from(seen::GRAZING_COS)), ("FITTERS", f64::from(FITTERS))],
+        );
+        assert_constants(
+            CHOICE,
+            &[
+                ("STEPS", virtual_camera::STEPS as f64),
+                ("ROUNDS", virtual_camera::ROUNDS as f64),
+                ("LEAST_GAIN", choice::least_gain(Lookup::Texel)),
+                ("SLACK", f64::from(seen::SLACK)),
+                ("caster_boxes_LEAST_PASSED", caster_boxes::LEAST),
+                ("caster_boxes_LEAN", caster_boxes::LEAN),
+                ("caster_image_DIRECTIONS", DIRECTIONS as f64),
+                ("fitted_CHOICES", fitted::CHOICES as f64),
+                ("fitted_MOST_SAMPLES", fitted::MOST_SAMPLES as f64),
+                ("fitted_FIRST_STEP", f64::from(fitted::FIRST_STEP)),
+                ("fitted_ROUNDS", f64::from(fitted::ROUNDS)),
+                ("fitted_SAME_SHAPE", f64::from(fitted::SAME)),
+                ("fitted_LEAST_W", f64::from(fitted::LEAST_W)),
+                ("warp_MARGIN", warp::MARGIN),
+                ("warp_FAR", f64::from(FAR)),
+            ],
+        );
+        assert_constants(VIEWS, &[("warp_NEAR_FRACTION", warp::NEAR_FRACTION)]);
+        assert_constants(
+            LOOKUP,
+            &[
+                ("NOTHING", f64::from(GBuffer::NOTHING)),
+                ("DEPTH_POSITION_ERROR", f64::from(DEPTH_POSITION_ERROR)),
+                ("follow_STEPS", f64::from(follow::STEPS)),
+                ("follow_NO_TRIANGLE", f64::from(NO_TRIANGLE)),
+            ],
+        );
     }
 }

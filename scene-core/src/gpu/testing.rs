@@ -140,6 +140,42 @@ pub fn struct_layout(wgsl: &str, name: &str) -> (Vec<(String, usize)>, usize) {
     (listed.collect(), *span as usize)
 }
 
+/// Asserts that constants of linked WGSL have these values, those of f32 rounded to it. A constant of an imported module is named by
+/// module and name, `fitted_ROUNDS`.
+///
+/// # Panics
+/// If one has another value; if `wgsl` does not parse, or has no such number.
+pub fn assert_constants(wgsl: &str, expected: &[(&str, f64)]) {
+    let module = naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|error| panic!("{error}"));
+    // Linking puts modules before a name, and the count of its underscores before each that has some.
+    let linked = |constant: &naga::Constant| {
+        let parts = constant.name.as_deref()?.split("__");
+        Some(
+            parts
+                .map(|part| part.trim_start_matches(|c: char| c.is_ascii_digit()))
+                .collect::<Vec<_>>()
+                .join("_"),
+        )
+    };
+    for &(name, value) in expected {
+        let imported = format!("_{name}");
+        let find = |is_it: &dyn Fn(&str) -> bool| {
+            module.constants.iter().find(|(_, constant)| linked(constant).is_some_and(|name| is_it(&name)))
+        };
+        let found = find(&|linked| linked == name).or_else(|| find(&|linked| linked.ends_with(&imported)));
+        let Some((_, constant)) = found else { panic!("there is no constant {name}") };
+        let (found, value) = match module.global_expressions[constant.init] {
+            naga::Expression::Literal(naga::Literal::F32(found)) => {
+                (f64::from(found), f64::from(value as f32))
+            }
+            naga::Expression::Literal(naga::Literal::U32(found)) => (f64::from(found), value),
+            naga::Expression::Literal(naga::Literal::I32(found)) => (f64::from(found), value),
+            ref other => panic!("{name} is no number: {other:?}"),
+        };
+        assert_eq!(found, value, "{name}");
+    }
+}
+
 /// Asserts that a Rust struct has size and offsets of the struct of this name in linked WGSL: `assert_layout!(CameraUniform,
 /// shaders::CAMERA, "Camera", [eye, far])`, all members of the shader's in their order. Padding is not named.
 #[macro_export]

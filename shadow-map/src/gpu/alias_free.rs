@@ -35,7 +35,7 @@ const RECEIVERS_A_CELL: f32 = 4.0;
 /// Cells a side at most.
 const MAX_SIDE: u32 = 1024;
 /// Words of `work` before those of cells.
-const FIRST_CELL: u32 = 64;
+pub(super) const FIRST_CELL: u32 = 64;
 /// Workgroups that every device dispatches along one axis.
 const MAX_GROUPS: u32 = 65_535;
 

@@ -293,11 +293,16 @@ impl PointUniform {
 #[cfg(test)]
 mod tests {
     use scene_core::assert_layout;
+    use scene_core::gpu::testing::assert_constants;
+    use scene_core::raster::DEPTH_POSITION_ERROR;
 
     use super::*;
+    use crate::cascades::MAX_CASCADES;
+    use crate::gpu::alias_free::FIRST_CELL;
     use crate::gpu::shaders::{
         CASCADES, HARD, IRREGULAR, MOMENTS, MULTI_VIEW, PCF, PCSS, PREPARE_DEPTHS, PREPARE_MOMENTS,
     };
+    use crate::{light_maps, light_views, moments, search_region};
 
     #[test]
     fn layouts_are_those_of_the_shaders() {
@@ -329,5 +334,34 @@ mod tests {
         assert_layout!(BoundUniform, MOMENTS, "Bound", [window, moments, light_bleeding, side]);
         assert_layout!(PointUniform, MULTI_VIEW, "Point", [center, radius, is_first]);
         assert_layout!(SoftUniform, PCSS, "Soft", [taps, seed, points]);
+    }
+
+    #[test]
+    fn constants_are_those_of_the_shaders() {
+        assert_constants(HARD, &[("hard_lookup_DEPTH_POSITION_ERROR", f64::from(DEPTH_POSITION_ERROR))]);
+        assert_constants(
+            PCF,
+            &[
+                ("taps_FAR_TEXEL", f64::from(light_maps::FAR_TEXEL)),
+                ("texel_plane_DEPTH_POSITION_ERROR", f64::from(DEPTH_POSITION_ERROR)),
+            ],
+        );
+        assert_constants(PCSS, &[("search_region_CUTS", search_region::CUTS as f64)]);
+        assert_constants(
+            PREPARE_MOMENTS,
+            &[("depth_scale_NEAR_FRACTION", f64::from(light_views::NEAR_FRACTION))],
+        );
+        assert_constants(
+            MOMENTS,
+            &[
+                ("moment_window_MOMENT_BIAS", f64::from(moments::MOMENT_BIAS)),
+                ("moment_window_LEAST_SPREAD", f64::from(moments::LEAST_SPREAD)),
+            ],
+        );
+        assert_constants(
+            CASCADES,
+            &[("MAX_CASCADES", MAX_CASCADES as f64), ("MARGIN", f64::from(light_views::MARGIN))],
+        );
+        assert_constants(IRREGULAR, &[("FIRST_CELL", f64::from(FIRST_CELL))]);
     }
 }

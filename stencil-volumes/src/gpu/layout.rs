@@ -66,9 +66,11 @@ pub struct ProjectionUniform {
 #[cfg(test)]
 mod tests {
     use scene_core::assert_layout;
+    use scene_core::gpu::testing::assert_constants;
 
     use super::*;
-    use crate::gpu::shaders::{FACING, PLANAR};
+    use crate::gpu::shaders::{ASK, BLOCKS, FACING, PLANAR, RUNS, TILES};
+    use crate::{cpu, outline, runs};
 
     #[test]
     fn layouts_are_those_of_the_shaders() {
@@ -101,6 +103,20 @@ mod tests {
             PLANAR,
             "Projection",
             [clip_from_relative, plane, origin, tolerance, object]
+        );
+    }
+
+    #[test]
+    fn constants_are_those_of_the_shaders() {
+        assert_constants(
+            TILES,
+            &[("volumes_TILE", cpu::TILE as f64), ("volumes_BLOCK_TILES", cpu::BLOCK_TILES as f64)],
+        );
+        assert_constants(BLOCKS, &[("volumes_BLOCK", cpu::BLOCK as f64)]);
+        assert_constants(RUNS, &[("volumes_RUN", runs::RUN as f64)]);
+        assert_constants(
+            ASK,
+            &[("sides_CLOSE", outline::CLOSE / 256.0), ("sides_OFF_CENTER", outline::OFF_CENTER / 256.0)],
         );
     }
 }
