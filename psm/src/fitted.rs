@@ -41,7 +41,7 @@ pub(crate) const FIRST_STEP: f32 = 0.25;
 /// Rounds after the first.
 pub(crate) const ROUNDS: u32 = 4;
 
-/// What is less than this share better is the same: rounding decides nothing.
+/// A round that gains less than this share stays where it was: rounding decides nothing.
 pub(crate) const SAME: f32 = 1.0 / 1024.0;
 
 /// The least w, as a share of the largest, over the receivers: more has no use that the samples could tell, and f32 holds places.
@@ -112,6 +112,10 @@ struct Measure {
     metrics: [Vec<f32>; 3],
 }
 
+/// How far to its left a direction leans: of receivers along a straight border that is square to it the last is the farthest, and no rounding
+/// decides.
+pub(crate) const LEAN: f64 = 1.0 / 64.0;
+
 /// Samples side by side.
 const LANES: usize = 8;
 
@@ -121,7 +125,7 @@ const ASKED_EACH: usize = 4 * LANES;
 impl Measure {
     fn new(scaled: &Warp, receivers: &[DVec2], samples: &[Sample]) -> Self {
         let extreme = |index: usize| {
-            let along = direction(index);
+            let along = direction(index) + direction(index + DIRECTIONS / 4) * LEAN;
             let farther = |best: (f64, DVec2), place: &DVec2| {
                 let reach = along.dot(*place);
                 if reach > best.0 { (reach, *place) } else { best }
@@ -218,11 +222,9 @@ pub fn least(image: &Warp, window: &Window, receivers: &[DVec3], near_shadows: &
         let shape = |index| if round == 0 { first(index) } else { around(center, step, index) };
         let indices = (0..CHOICES).into_par_iter().with_min_len(CHOICES / 4);
         let errors: Vec<f32> = indices.map(|index| measure.of_less(shape(index), limit)).collect();
-        for (shape, error) in (0..CHOICES).map(shape).zip(errors) {
-            if error < best.1 * (1.0 - SAME) {
-                best = (shape, error);
-            }
-        }
+        // Of equal ones the first.
+        let least = (0..CHOICES).map(shape).zip(errors).reduce(|a, b| if b.1 < a.1 { b } else { a });
+        best = least.filter(|least| least.1 < limit * (1.0 - SAME)).unwrap_or(best);
         if round > 0 {
             step *= 0.5;
         }

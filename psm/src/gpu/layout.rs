@@ -233,6 +233,7 @@ mod tests {
                 ("ROUNDS", virtual_camera::ROUNDS as f64),
                 ("LEAST_GAIN", choice::least_gain(Lookup::Texel)),
                 ("SLACK", f64::from(seen::SLACK)),
+                ("LEAN", fitted::LEAN),
                 ("caster_boxes_LEAST_PASSED", caster_boxes::LEAST),
                 ("caster_boxes_LEAN", caster_boxes::LEAN),
                 ("caster_image_DIRECTIONS", DIRECTIONS as f64),
