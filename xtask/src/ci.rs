@@ -2,7 +2,7 @@
 
 use crate::shell::{CheckError, cargo};
 use crate::snapshots::Report;
-use crate::{docs, gallery, instructions, package, shaders, tidy, vulkan};
+use crate::{docs, gallery, instructions, package, shaders, test_binaries, tidy, vulkan};
 
 pub(crate) fn run() -> Result<(), CheckError> {
     tidy::run()?;
@@ -23,8 +23,8 @@ pub(crate) fn run() -> Result<(), CheckError> {
     let environment: Vec<_> = environment.collect();
     let environment: Vec<_> = environment.iter().map(|(name, value)| (*name, value.as_str())).collect();
     // Examples are not built again: clippy has compiled them, and tests that want one take its code.
-    let tested = cargo(&["test", "--workspace", "--profile", "ci", "--tests"], &environment);
-    // Where a test failed others have not run, and asked for nothing.
+    let tested = test_binaries::run(&environment);
+    // Where tests failed some have asked for nothing.
     let found = report.write(tested.is_ok())?;
     tested?;
     if let Some(finding) = found.first() {

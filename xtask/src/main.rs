@@ -14,6 +14,7 @@ mod results;
 mod shaders;
 mod shell;
 mod snapshots;
+mod test_binaries;
 mod tidy;
 mod vulkan;
 
