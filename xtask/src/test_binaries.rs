@@ -29,7 +29,7 @@ pub(crate) fn run(environment: &[(&str, &str)]) -> Result<(), CheckError> {
 }
 
 /// A test binary that cargo has built.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct TestBinary {
     /// The file of its source, below the workspace.
     name: String,
@@ -38,7 +38,7 @@ struct TestBinary {
     folder: PathBuf,
 }
 
-/// Those that cargo's messages name, the last built first: they are of the crates that all others are below, and take longest.
+/// Those that cargo's messages name, by name: the command's, which take longest, come early, and no two runs differ.
 fn test_binaries(messages: &str) -> Vec<TestBinary> {
     let binary = |line: &str| {
         let message: Value = serde_json::from_str(line).ok()?;
@@ -49,7 +49,9 @@ fn test_binaries(messages: &str) -> Vec<TestBinary> {
         let folder = Path::new(manifest).parent()?.to_owned();
         is_test.then(|| TestBinary { name, program: program.into(), folder })
     };
-    messages.lines().rev().filter_map(binary).collect()
+    let mut binaries: Vec<_> = messages.lines().filter_map(binary).collect();
+    binaries.sort();
+    binaries
 }
 
 fn run_all(binaries: &[TestBinary], environment: &[(&str, &str)]) -> Result<(), CheckError> {
