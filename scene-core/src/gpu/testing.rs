@@ -126,13 +126,17 @@ pub fn run_kernel<I: Pod, O: Pod>(gpu: &Gpu, wgsl: &str, inputs: &[I]) -> Result
     gpu.read_buffer(&outputs)
 }
 
+fn parsed(wgsl: &str) -> naga::Module {
+    naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|error| panic!("{error}"))
+}
+
 /// Name and offset of each member of a struct in linked WGSL, and its size in bytes. Linking puts a module's path before
 /// names, so `name` is the end of one.
 ///
 /// # Panics
 /// If `wgsl` does not parse or has no such struct.
 pub fn struct_layout(wgsl: &str, name: &str) -> (Vec<(String, usize)>, usize) {
-    let module = naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|error| panic!("{error}"));
+    let module = parsed(wgsl);
     let is_it = |ty: &naga::Type| ty.name.as_deref().is_some_and(|linked| linked.ends_with(name));
     let found = module.types.iter().find(|(_, ty)| is_it(ty)).map(|(_, ty)| &ty.inner);
     let Some(naga::TypeInner::Struct { members, span }) = found else { panic!("there is no struct {name}") };
@@ -146,23 +150,16 @@ pub fn struct_layout(wgsl: &str, name: &str) -> (Vec<(String, usize)>, usize) {
 /// # Panics
 /// If one has another value; if `wgsl` does not parse, or has no such number.
 pub fn assert_constants(wgsl: &str, expected: &[(&str, f64)]) {
-    let module = naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|error| panic!("{error}"));
+    let module = parsed(wgsl);
     // Linking puts modules before a name, and the count of its underscores before each that has some.
-    let linked = |constant: &naga::Constant| {
-        let parts = constant.name.as_deref()?.split("__");
-        Some(
-            parts
-                .map(|part| part.trim_start_matches(|c: char| c.is_ascii_digit()))
-                .collect::<Vec<_>>()
-                .join("_"),
-        )
-    };
+    let unmarked = |part: &str| part.trim_start_matches(|c: char| c.is_ascii_digit()).to_owned();
+    let linked = |name: &str| name.split("__").map(unmarked).collect::<Vec<_>>().join("_");
+    let constants = module.constants.iter().map(|(_, constant)| constant);
+    let named: Vec<_> = constants.map(|c| (linked(c.name.as_deref().unwrap_or_default()), c)).collect();
     for &(name, value) in expected {
         let imported = format!("_{name}");
-        let find = |is_it: &dyn Fn(&str) -> bool| {
-            module.constants.iter().find(|(_, constant)| linked(constant).is_some_and(|name| is_it(&name)))
-        };
-        let found = find(&|linked| linked == name).or_else(|| find(&|linked| linked.ends_with(&imported)));
+        let own = named.iter().find(|(linked, _)| linked == name);
+        let found = own.or_else(|| named.iter().find(|(linked, _)| linked.ends_with(&imported)));
         let Some((_, constant)) = found else { panic!("there is no constant {name}") };
         let (found, value) = match module.global_expressions[constant.init] {
             naga::Expression::Literal(naga::Literal::F32(found)) => {
@@ -186,4 +183,36 @@ macro_rules! assert_layout {
         assert_eq!(members, expected, "{}", $name);
         assert_eq!(size, ::core::mem::size_of::<$rust>(), "{}", $name);
     };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WGSL: &str = "const STEPS: u32 = 4u; const package__1the_module__1MOST_STEPS: u32 = 8u; \
+        const package_other_STEPS: u32 = 9u; const LEAST: f32 = 0.1; const LOW: i32 = -2;";
+
+    #[test]
+    fn constants_are_found_by_their_module_and_name() {
+        let expected = [
+            ("STEPS", 4.0),
+            ("the_module_MOST_STEPS", 8.0),
+            ("other_STEPS", 9.0),
+            ("LEAST", 0.1),
+            ("LOW", -2.0),
+        ];
+        assert_constants(WGSL, &expected);
+    }
+
+    #[test]
+    #[should_panic(expected = "STEPS")]
+    fn a_constant_of_another_value_is_told() {
+        assert_constants(WGSL, &[("STEPS", 8.0)]);
+    }
+
+    #[test]
+    #[should_panic(expected = "there is no constant MOST")]
+    fn a_constant_that_is_not_there_is_told() {
+        assert_constants(WGSL, &[("MOST", 8.0)]);
+    }
 }
