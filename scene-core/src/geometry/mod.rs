@@ -2,10 +2,12 @@
 
 mod aabb;
 mod alpha;
+mod deal;
 mod facing;
 mod mesh;
 mod repair;
 mod scene;
+mod sides;
 mod surfaces;
 mod topology;
 mod triangulate;

@@ -2,9 +2,13 @@
 //!
 //! For walks over a surface from a triangle that is known to one that is asked for, on the CPU and, in the same layout, on a GPU.
 
-use bytemuck::{Pod, Zeroable};
+use std::sync::atomic::{AtomicU32, Ordering};
 
-use super::{Aabb, EdgeTopology, Scene, TopologyError};
+use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
+
+use super::sides::Sides;
+use super::{Aabb, Scene, TopologyError};
 
 /// No triangle lies across an edge.
 pub const NO_TRIANGLE: u32 = u32::MAX;
@@ -20,10 +24,6 @@ pub struct SurfaceTriangle {
     pub extent: f32,
 }
 
-impl SurfaceTriangle {
-    const NONE: Self = Self { across: [NO_TRIANGLE; 3], extent: 0.0 };
-}
-
 /// The connected surfaces of a scene's solid casters, by [`Scene::triangles`].
 #[derive(Clone, Debug, Default)]
 pub struct Surfaces {
@@ -36,26 +36,31 @@ impl Surfaces {
     /// # Errors
     /// More triangles than can be numbered.
     pub fn new(scene: &Scene) -> Result<Self, TopologyError> {
-        let topology = EdgeTopology::of_scene(scene, |o| o.flags.casts && o.alpha.is_none())?;
-        let mut triangles = vec![SurfaceTriangle::NONE; scene.triangles().len()];
-        for edge in 0..topology.len() {
-            // Vertices are named by the first one at their position, so only positions tell which edge of a face it is.
-            let ends = topology.vertices()[edge].map(|v| scene.positions()[v as usize]);
-            let faces = topology.faces(edge);
-            for (index, face) in faces.iter().enumerate() {
-                let triangle = &mut triangles[face.face() as usize];
-                // In a surface, if only of one triangle.
-                triangle.extent = f32::INFINITY;
-                if let [_, _] = faces {
-                    let [from, to] = if face.sign() > 0 { ends } else { [ends[1], ends[0]] };
-                    let corners = scene.corners(face.face() as usize);
-                    if let Some(side) = (0..3).find(|&i| corners[i] == from && corners[(i + 1) % 3] == to) {
-                        triangle.across[side] = faces[1 - index].face();
+        let sides =
+            Sides::of_scene(scene, |o| o.flags.casts && o.alpha.is_none(), |face, side, _| 3 * face + side)?;
+        let none = |_| [NO_TRIANGLE, NO_TRIANGLE, NO_TRIANGLE, 0].map(AtomicU32::new);
+        let triangles: Vec<_> = (0..scene.triangles().len()).into_par_iter().map(none).collect();
+        let of = |name: u64| (&triangles[name as u32 as usize / 3], name as u32 as usize % 3);
+        sides.by_bucket(|rows| {
+            for (_, edge) in rows.edges() {
+                for &name in edge {
+                    // In a surface, if only of one triangle.
+                    of(name).0[3].store(f32::INFINITY.to_bits(), Ordering::Relaxed);
+                }
+                if let [a, b] = *edge {
+                    for (name, other) in [(a, b), (b, a)] {
+                        let (triangle, side) = of(name);
+                        triangle[side].store(other as u32 / 3, Ordering::Relaxed);
                     }
                 }
             }
-        }
-        let mut surfaces = Self { triangles };
+        });
+        drop(sides);
+        let known = |[a, b, c, extent]: [AtomicU32; 4]| SurfaceTriangle {
+            across: [a, b, c].map(AtomicU32::into_inner),
+            extent: f32::from_bits(extent.into_inner()),
+        };
+        let mut surfaces = Self { triangles: triangles.into_iter().map(known).collect() };
         surfaces.measure(scene);
         Ok(surfaces)
     }
@@ -118,6 +123,8 @@ mod tests {
     use crate::TriangleMesh;
     use crate::geometry::{AlphaMask, ObjectFlags};
 
+    const NONE: SurfaceTriangle = SurfaceTriangle { across: [NO_TRIANGLE; 3], extent: 0.0 };
+
     /// Four points around the middle of a square, at `height`, and its four triangles, which share no vertex index.
     fn fan(height: f32) -> TriangleMesh {
         let around = [Vec3::X, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Z].map(|corner| corner + Vec3::Y * height);
@@ -163,10 +170,10 @@ mod tests {
         masked.alpha = AlphaMask::from_alpha(1, 1, &[0], 0.5, Default::default()).map(Arc::new);
         for scene in [scene_of(&[fan(0.0)], flags), scene_of(&[masked], ObjectFlags::default())] {
             let surfaces = Surfaces::new(&scene).unwrap();
-            assert!(surfaces.triangles().iter().all(|&triangle| triangle == SurfaceTriangle::NONE));
+            assert!(surfaces.triangles().iter().all(|&triangle| triangle == NONE));
         }
         let point = TriangleMesh::new("point", vec![Vec3::ONE; 3], vec![[0, 1, 2]]);
         let surfaces = Surfaces::new(&scene_of(&[point], ObjectFlags::default())).unwrap();
-        assert_eq!(surfaces.of(0), &SurfaceTriangle::NONE);
+        assert_eq!(surfaces.of(0), &NONE);
     }
 }

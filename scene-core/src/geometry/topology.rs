@@ -34,7 +34,8 @@ use glam::Vec3;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::{Object, Scene, weld};
+use super::sides::{Rows, Sides};
+use super::{Object, Scene};
 
 /// Why no topology was built.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -126,9 +127,6 @@ impl EdgeTopology {
     /// The edges of `triangles`, welded by exact position. Faces keep their index; vertices are named by the
     /// first one at their position, so that `positions` can be read with them.
     ///
-    /// Time is linear but for the sorting of each vertex's few edges: corners are bucketed by their edge's
-    /// lower vertex in one counting pass, then each bucket is sorted.
-    ///
     /// # Errors
     /// An index out of range, or more than [`Self::MAX_TRIANGLES`].
     pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self, TopologyError> {
@@ -138,7 +136,8 @@ impl EdgeTopology {
                 return Err(TopologyError::IndexOutOfRange { triangle, index, vertices });
             }
         }
-        Self::of_ranges(positions, triangles, std::slice::from_ref(&(0..triangles.len())))
+        let all = 0..triangles.len();
+        Sides::of_ranges(positions, triangles, std::slice::from_ref(&all), name_incidence).map(Self::of)
     }
 
     /// The edges of those objects of a scene that `take` chooses, welded across objects. Faces are
@@ -147,60 +146,14 @@ impl EdgeTopology {
     /// # Errors
     /// More than [`Self::MAX_TRIANGLES`].
     pub fn of_scene(scene: &Scene, take: impl Fn(&Object) -> bool) -> Result<Self, TopologyError> {
-        let ranges: Vec<_> =
-            scene.objects().iter().filter(|o| take(o)).map(|o| o.triangles.clone()).collect();
-        Self::of_ranges(scene.positions(), scene.triangles(), &ranges)
+        Sides::of_scene(scene, take, name_incidence).map(Self::of)
     }
 
-    /// Indices are in range.
-    fn of_ranges(
-        positions: &[Vec3],
-        triangles: &[[u32; 3]],
-        ranges: &[Range<usize>],
-    ) -> Result<Self, TopologyError> {
-        if triangles.len() > Self::MAX_TRIANGLES {
-            return Err(TopologyError::TooManyTriangles { count: triangles.len() });
-        }
-        let representative = weld(positions).representative;
-        let welded = |face: usize| triangles[face].map(|i| representative[i as usize]);
-        let faces = || ranges.iter().cloned().flatten();
-
-        let mut bucket_first = vec![0u32; positions.len() + 1];
-        let mut degenerate = 0;
-        for face in faces() {
-            let [a, b, c] = welded(face);
-            if is_degenerate([a, b, c]) {
-                degenerate += 1;
-            } else {
-                for lower in [a.min(b), b.min(c), c.min(a)] {
-                    bucket_first[lower as usize + 1] += 1;
-                }
-            }
-        }
-        let mut corners = 0;
-        for first in &mut bucket_first {
-            corners += *first;
-            *first = corners;
-        }
-
-        // An entry is (upper vertex, incidence) in one integer, which sorts as the pair does. Placing moves
-        // each bucket's cursor to its end, which is where the next bucket begins: undone by reading the
-        // array shifted by one.
-        let mut entries = vec![0u64; corners as usize];
-        for face in faces() {
-            let [a, b, c] = welded(face);
-            if !is_degenerate([a, b, c]) {
-                for (from, to) in [(a, b), (b, c), (c, a)] {
-                    let incidence = Incidence::new(face as u32, from < to);
-                    let cursor = &mut bucket_first[from.min(to) as usize];
-                    entries[*cursor as usize] = u64::from(from.max(to)) << 32 | u64::from(incidence.0);
-                    *cursor += 1;
-                }
-            }
-        }
-        drop(representative);
-        let bucket_end = &bucket_first[..positions.len()];
-        Ok(Self { degenerate, ..collect_edges(&mut entries, bucket_end) })
+    fn of(sides: Sides) -> Self {
+        let parts = sides.by_bucket(EdgePart::new);
+        let degenerate = sides.degenerate;
+        drop(sides);
+        Self { degenerate, ..EdgePart::join(parts) }
     }
 
     /// The edges of faces whose sides are given one by one, each by the vertices that the face runs along, from the first to
@@ -296,73 +249,51 @@ impl EdgeTopology {
     }
 }
 
+/// What [`EdgeTopology`] keeps of a face's side.
 #[inline]
-fn is_degenerate([a, b, c]: [u32; 3]) -> bool {
-    a == b || b == c || c == a
+fn name_incidence(face: u32, _side: u32, along: bool) -> u32 {
+    Incidence::new(face, along).0
 }
 
-/// A run of buckets and their entries, cut so that tasks have about equal work.
-struct Task<'a> {
-    buckets: Range<usize>,
-    first_entry: usize,
-    entries: &'a mut [u64],
+/// The edges of one bucket.
+struct EdgePart {
+    vertices: Vec<[u32; 2]>,
+    /// Where the faces of each begin, in this part.
+    first: Vec<u32>,
+    incident: Vec<Incidence>,
 }
 
-/// Sorts each bucket and gathers equal pairs into edges. Bucket v, the edges whose lower vertex is v, ends
-/// where `bucket_end[v]` says and begins where the one before ends.
-fn collect_edges(entries: &mut [u64], bucket_end: &[u32]) -> EdgeTopology {
-    let corners = entries.len();
-    let per_task = (corners / (4 * rayon::current_num_threads())).max(1 << 14);
-    let mut tasks = Vec::new();
-    let (mut rest, mut bucket, mut first_entry) = (entries, 0, 0);
-    while !rest.is_empty() {
-        let goal = (first_entry + per_task).min(corners);
-        let next = bucket + bucket_end[bucket..].partition_point(|&end| (end as usize) < goal) + 1;
-        let end = bucket_end[next - 1] as usize;
-        let (mine, others) = rest.split_at_mut(end - first_entry);
-        tasks.push(Task { buckets: bucket..next, first_entry, entries: mine });
-        (rest, bucket, first_entry) = (others, next, end);
-    }
-    let parts: Vec<_> = tasks.into_par_iter().map(|task| task.run(bucket_end)).collect();
-
-    let edges = parts.iter().map(|part| part.0.len()).sum();
-    let mut topology = EdgeTopology {
-        vertices: Vec::with_capacity(edges),
-        first: Vec::with_capacity(edges + 1),
-        incident: Vec::with_capacity(corners),
-        degenerate: 0,
-    };
-    for (vertices, first, incident) in parts {
-        topology.vertices.extend(vertices);
-        topology.first.extend(first);
-        topology.incident.extend(incident);
-    }
-    topology.first.push(corners as u32);
-    topology
-}
-
-impl Task<'_> {
-    fn run(self, bucket_end: &[u32]) -> (Vec<[u32; 2]>, Vec<u32>, Vec<Incidence>) {
+impl EdgePart {
+    fn new(rows: &Rows) -> Self {
         // A closed surface has two faces an edge.
-        let guess = self.entries.len() / 2 + self.entries.len() / 16;
+        let guess = rows.entries().len() / 2 + rows.entries().len() / 16;
         let (mut vertices, mut first) = (Vec::with_capacity(guess), Vec::with_capacity(guess));
-        let mut begin = 0;
-        for lower in self.buckets {
-            let end = bucket_end[lower] as usize - self.first_entry;
-            let bucket = &mut self.entries[begin..end];
-            bucket.sort_unstable();
-            let mut last = None;
-            for (i, entry) in bucket.iter().enumerate() {
-                let upper = (entry >> 32) as u32;
-                if last != Some(upper) {
-                    last = Some(upper);
-                    vertices.push([lower as u32, upper]);
-                    first.push((self.first_entry + begin + i) as u32);
-                }
-            }
-            begin = end;
+        let mut sides = 0;
+        for (edge, names) in rows.edges() {
+            vertices.push(edge);
+            first.push(sides);
+            sides += names.len() as u32;
         }
-        let incident = self.entries.iter().map(|&entry| Incidence(entry as u32)).collect();
-        (vertices, first, incident)
+        let incident = rows.entries().iter().map(|&entry| Incidence(entry as u32)).collect();
+        Self { vertices, first, incident }
+    }
+
+    fn join(parts: Vec<Self>) -> EdgeTopology {
+        let edges = parts.iter().map(|part| part.vertices.len()).sum();
+        let sides = parts.iter().map(|part| part.incident.len()).sum();
+        let mut topology = EdgeTopology {
+            vertices: Vec::with_capacity(edges),
+            first: Vec::with_capacity(edges + 1),
+            incident: Vec::with_capacity(sides),
+            degenerate: 0,
+        };
+        for Self { vertices, first, incident } in parts {
+            let before = topology.incident.len() as u32;
+            topology.vertices.extend(vertices);
+            topology.first.extend(first.into_iter().map(|first| before + first));
+            topology.incident.extend(incident);
+        }
+        topology.first.push(sides as u32);
+        topology
     }
 }

@@ -7,6 +7,8 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::deal::{Dealt, MOST_BUCKETS};
+
 /// Which vertices share a position.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Weld {
@@ -17,35 +19,84 @@ pub struct Weld {
     pub unique: usize,
 }
 
-/// Welds `positions` by exact equality. Sorts their hashes, in parallel: a table of them would miss the cache once a vertex.
+/// Vertices of a bucket, about: what is looked up in it fits into a core's cache.
+const PER_BUCKET: usize = 8192;
+
+/// Vertices that are dealt to buckets together.
+const PER_CHUNK: usize = 1 << 17;
+
+/// Welds `positions` by exact equality. Vertices are dealt to buckets by their hash, chunk by chunk, and looked up in a table
+/// within each bucket: a table of all would miss the cache once a vertex.
 ///
 /// NaN coordinates are welded if their bits are equal. An empty slice gives an empty weld. Positions beyond
 /// the first `u32::MAX` are out of reach of 32-bit indices and are not read.
 pub fn weld(positions: &[Vec3]) -> Weld {
     let positions = &positions[..positions.len().min(u32::MAX as usize)];
-    // Hash above vertex: one integer, which sorts as the pair does.
-    let entry = |(vertex, &position): (usize, &Vec3)| hash(key(position)) >> 32 << 32 | vertex as u64;
-    let mut by_hash: Vec<u64> = positions.par_iter().enumerate().map(entry).collect();
-    by_hash.par_sort_unstable();
-    let mut representative = vec![0; positions.len()];
-    let mut unique = 0;
-    let mut firsts = Vec::new();
-    for same_hash in by_hash.chunk_by(|a, b| a >> 32 == b >> 32) {
-        firsts.clear();
-        for vertex in same_hash.iter().map(|&entry| entry as u32) {
-            let position = || key(positions[vertex as usize]);
-            // Almost always there is one; alone in its run, it is not even read.
-            let first =
-                firsts.iter().copied().find(|&first: &u32| key(positions[first as usize]) == position());
-            let first = first.unwrap_or_else(|| {
-                firsts.push(vertex);
-                vertex
-            });
-            representative[vertex as usize] = first;
-        }
-        unique += firsts.len();
+    let buckets = (positions.len() / PER_BUCKET).next_power_of_two().min(MOST_BUCKETS);
+    let chunks: Vec<_> = positions
+        .par_chunks(PER_CHUNK)
+        .enumerate()
+        .map(|(chunk, positions)| deal(positions, chunk * PER_CHUNK, buckets))
+        .collect();
+    let repeated: Vec<Vec<[u32; 2]>> = (0..buckets)
+        .into_par_iter()
+        .map_init(Vec::new, |table, bucket| {
+            let parts = || chunks.iter().map(|chunk| chunk.bucket(bucket));
+            repeated(positions, parts, table)
+        })
+        .collect();
+    let mut representative: Vec<u32> = (0..positions.len() as u32).into_par_iter().collect();
+    let mut unique = positions.len();
+    for [vertex, first] in repeated.into_iter().flatten() {
+        representative[vertex as usize] = first;
+        unique -= 1;
     }
     Weld { representative, unique }
+}
+
+/// A chunk's vertices, of which `first` is the first, by their hashes' uppermost bits: the upper half of the hash above the vertex.
+fn deal(positions: &[Vec3], first: usize, buckets: usize) -> Dealt<u64> {
+    let bits = buckets.trailing_zeros();
+    Dealt::new(buckets, || {
+        (first as u64..).zip(positions).map(|(vertex, &position)| {
+            let hash = hash(key(position));
+            let bucket = hash.checked_shr(u64::BITS - bits).unwrap_or(0);
+            (bucket as usize, hash >> 32 << 32 | vertex)
+        })
+    })
+}
+
+/// The vertices of one bucket, given in order, that lie where another has lain before, each with the first there.
+fn repeated<'a, I>(positions: &[Vec3], parts: impl Fn() -> I, table: &mut Vec<u64>) -> Vec<[u32; 2]>
+where
+    I: Iterator<Item = &'a [u64]>,
+{
+    // No vertex has this number.
+    const FREE: u64 = u64::MAX;
+    let count: usize = parts().map(<[u64]>::len).sum();
+    let slots = (2 * count).next_power_of_two();
+    table.clear();
+    table.resize(slots, FREE);
+    let mut repeated = Vec::new();
+    for &entry in parts().flatten() {
+        let mut slot = (entry >> 32) as usize & (slots - 1);
+        loop {
+            let held = table[slot];
+            if held == FREE {
+                table[slot] = entry;
+                break;
+            }
+            let (vertex, first) = (entry as u32, held as u32);
+            // Positions are far away in memory: read only where the hashes are the same.
+            if held >> 32 == entry >> 32 && key(positions[vertex as usize]) == key(positions[first as usize])
+            {
+                repeated.push([vertex, first]);
+                break;
+            }
+            slot = (slot + 1) & (slots - 1);
+        }
+    }
+    repeated
 }
 
 /// The bits of a position, with −0 turned into +0 (IEEE 754: −0 + 0 = +0).
@@ -91,6 +142,16 @@ mod tests {
             .map(|i| Vec3::new((i % side) as f32, (i / side % side) as f32, (i / side / side) as f32))
             .collect();
         assert_eq!(weld(&grid).unique, grid.len());
+    }
+
+    /// More than a chunk apart, in many buckets.
+    #[test]
+    fn all_repetitions_are_found_whatever_lies_between() {
+        let place = |i: u32| Vec3::new((i % 300) as f32, (i / 300) as f32 * 0.1, -1.0);
+        const COUNT: u32 = 150_000;
+        let positions: Vec<Vec3> = (0..COUNT).chain((0..COUNT).rev()).map(place).collect();
+        let expected = (0..COUNT).chain((0..COUNT).rev()).collect();
+        assert_eq!(weld(&positions), Weld { representative: expected, unique: COUNT as usize });
     }
 
     proptest! {
