@@ -72,6 +72,10 @@ impl Layers {
 
     /// Takes over its outlines: those of `edges` that the light's centre sees, numbered from `first`, relative to `origin`.
     pub fn set_outlines(&mut self, edges: &[Edge], first: u32, origin: Vec3) {
+        if self.fragments.is_empty() {
+            // No face is drawn here: there is nothing to count, nor squares to look into.
+            return;
+        }
         let seen = |(index, edge): (u32, &Edge)| {
             let ends = self.image.snapped([edge.a + origin, edge.b + origin])?;
             (edge.from_center != 0).then_some(CenterEdge {

@@ -47,9 +47,12 @@ impl LightCone {
                     return None;
                 }
                 let (u, v) = (w / distance).any_orthonormal_pair();
-                let angle = (radius / distance).asin();
-                let radius = angle.tan() * distance;
-                (u * radius, v * radius, w, true, one_less_cos(angle))
+                // The tangents' length, and what it is of the distance.
+                let tangent = ((distance - radius) * (distance + radius)).sqrt();
+                let sine = radius / distance;
+                let height = sine * sine / (1.0 + tangent / distance);
+                let radius = radius * distance / tangent;
+                (u * radius, v * radius, w, true, height)
             }
             Light::Rect { center, half_u, half_v } => (half_u, half_v, center - receiver, false, 0.0),
             Light::Disk { center, normal, radius } => {
