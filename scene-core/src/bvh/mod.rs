@@ -30,6 +30,7 @@ use std::sync::Arc;
 
 use fearless_simd::Level;
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
 use crate::geometry::{Aabb, AlphaMask, Scene};
 
@@ -114,11 +115,9 @@ impl Bvh {
     /// # Panics
     /// If there is no such triangle.
     pub fn of_triangles(scene: &Scene, triangles: impl IntoIterator<Item = usize>) -> Self {
-        let ids: Vec<u32> = triangles
-            .into_iter()
-            .filter(|&triangle| !exact::is_degenerate(scene.corners(triangle)))
-            .map(|triangle| triangle as u32)
-            .collect();
+        let ids: Vec<u32> = triangles.into_iter().map(|triangle| triangle as u32).collect();
+        let has_area = |&triangle: &u32| !exact::is_degenerate(scene.corners(triangle as usize));
+        let ids: Vec<u32> = ids.into_par_iter().filter(has_area).collect();
         let tree = Tree::build(&ids, |id| scene.corners(id as usize));
         let masks = scene.has_alpha().then(|| Masks::new(scene, &tree));
         Self { tree, masks, level: Level::new() }

@@ -7,6 +7,7 @@
 //! Memory: a leaf block takes 320 bytes and is two thirds full on most meshes, a node 256 bytes for about
 //! forty triangles: 60 to 80 bytes a triangle in all. Building takes about four times that for a moment.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use glam::{Vec3, Vec3A};
@@ -114,7 +115,9 @@ impl Tree {
         };
         if !ids.is_empty() {
             let binary = build_binary(ids, &corners, bounds);
-            Collapse::new(&binary, ids, &corners).run(&mut tree);
+            let Part { nodes, triangles, stack } = Collapse { binary: &binary, ids, corners: &corners }.run();
+            (tree.nodes, tree.triangles, tree.stack) = (nodes, triangles, stack);
+            tree.root = Some(Link::node(0));
             tree.blocks = tree
                 .triangles
                 .par_iter()
@@ -167,8 +170,9 @@ fn build_binary(ids: &[u32], corners: &(impl Fn(u32) -> [Vec3; 3] + Sync), bound
             obvhs::aabb::Aabb::new(low, high)
         })
         .collect();
-    // Leaves are formed below, so the builder keeps one triangle a leaf.
-    let mut params = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::medium_build() };
+    // Leaves are formed below, so the builder keeps one triangle a leaf. A medium build takes half as long again, and rays of
+    // neither are told apart by their time.
+    let mut params = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::fast_build() };
     // Boxes that cover the whole a thousand times over cannot be parted by any tree, and looking for better
     // places among them takes time with the square of their number.
     let whole = obvhs::aabb::Aabb::new(unit(bounds.min), unit(bounds.max)).half_area();
@@ -180,128 +184,193 @@ fn build_binary(ids: &[u32], corners: &(impl Fn(u32) -> [Vec3; 3] + Sync), bound
 }
 
 /// The binary tree on its way to a wide one.
-struct Collapse<'a> {
+struct Collapse<'a, C> {
     binary: &'a Bvh2,
     ids: &'a [u32],
-    /// Per binary node: triangles below it.
-    counts: Vec<u32>,
-    /// Per binary node: the box around its triangles, exact.
-    boxes: Vec<Aabb>,
+    corners: &'a C,
 }
 
-impl<'a> Collapse<'a> {
-    fn new(binary: &'a Bvh2, ids: &'a [u32], corners: &impl Fn(u32) -> [Vec3; 3]) -> Self {
-        let nodes = &binary.nodes;
-        let mut order = Vec::with_capacity(nodes.len());
-        let mut pending = vec![0_u32];
-        while let Some(index) = pending.pop() {
-            order.push(index);
-            let node = &nodes[index as usize];
-            if !node.is_leaf() {
-                pending.extend([node.first_index, node.first_index + 1]);
-            }
+/// Subtrees that are collapsed side by side, about; not a matter of threads, on which no tree depends.
+const PARTS: usize = 64;
+
+/// A wide tree whose first node is its root; a node comes after its parent.
+#[derive(Default)]
+struct Part {
+    nodes: Vec<Node>,
+    triangles: Vec<[u32; WIDTH]>,
+    stack: usize,
+}
+
+/// A binary node that is to become a wide one.
+#[derive(Clone, Copy)]
+struct Pending {
+    binary: usize,
+    /// The wide node above it in its part, and its slot there.
+    parent: Option<(usize, usize)>,
+    depth: usize,
+}
+
+impl Part {
+    /// Takes over another, whose root goes to a slot of a node of this one.
+    fn append(&mut self, parent: Option<(usize, usize)>, other: Self) {
+        let (nodes, blocks) = (self.nodes.len(), self.triangles.len());
+        if let Some((node, slot)) = parent {
+            self.nodes[node].links[slot] = Link::node(nodes);
         }
-        let mut counts = vec![0; nodes.len()];
-        let mut boxes = vec![Aabb::EMPTY; nodes.len()];
-        for &index in order.iter().rev() {
-            let index = index as usize;
-            let node = &nodes[index];
-            let first = node.first_index as usize;
-            if node.is_leaf() {
-                counts[index] = node.prim_count;
-                for &slot in &binary.primitive_indices[first..first + node.prim_count as usize] {
-                    boxes[index] = boxes[index].union(Aabb::from_points(corners(ids[slot as usize])));
-                }
-            } else {
-                counts[index] = counts[first] + counts[first + 1];
-                boxes[index] = boxes[first].union(boxes[first + 1]);
+        self.nodes.extend(other.nodes.into_iter().map(|mut node| {
+            for link in &mut node.links[..node.count as usize] {
+                *link = match link.is_leaf() {
+                    true => Link::leaf(link.index() + blocks, link.count()),
+                    false => Link::node(link.index() + nodes),
+                };
             }
-        }
-        Self { binary, ids, counts, boxes }
+            node
+        }));
+        self.triangles.extend(other.triangles);
+        self.stack = self.stack.max(other.stack);
     }
 
-    fn run(&self, tree: &mut Tree) {
-        tree.root = Some(Link::node(0));
-        let empty = Node {
+    /// Takes the boxes of inner nodes from those of their children, of which those of leaves are known.
+    fn bound(&mut self) {
+        for index in (0..self.nodes.len()).rev() {
+            let (before, from) = self.nodes.split_at_mut(index + 1);
+            let node = &mut before[index];
+            for slot in (0..node.count as usize).filter(|slot| node.leaves >> slot & 1 == 0) {
+                let child = &from[node.links[slot].index() - index - 1];
+                for axis in 0..3 {
+                    node.lo[axis][slot] = child.lo[axis].into_iter().fold(f32::INFINITY, f32::min);
+                    node.hi[axis][slot] = child.hi[axis].into_iter().fold(f32::NEG_INFINITY, f32::max);
+                }
+            }
+        }
+    }
+}
+
+impl<C: Fn(u32) -> [Vec3; 3] + Sync> Collapse<'_, C> {
+    fn run(&self) -> Part {
+        let mut tree = Part::default();
+        let mut pending = VecDeque::from([Pending { binary: 0, parent: None, depth: 1 }]);
+        while pending.len() < PARTS
+            && let Some(next) = pending.pop_front()
+        {
+            self.open(&next, &mut tree, |inner| pending.push_back(inner));
+        }
+        let parts: Vec<_> = pending.into_par_iter().map(|root| (root.parent, self.part(root))).collect();
+        for (parent, part) in parts {
+            tree.append(parent, part);
+        }
+        tree.bound();
+        tree
+    }
+
+    /// All below one node.
+    fn part(&self, root: Pending) -> Part {
+        let mut part = Part::default();
+        let mut pending = vec![Pending { parent: None, ..root }];
+        while let Some(next) = pending.pop() {
+            self.open(&next, &mut part, |inner| pending.push(inner));
+        }
+        part
+    }
+
+    /// Makes a wide node, its leaves included; `inner` is told of its other children.
+    fn open(&self, from: &Pending, part: &mut Part, mut inner: impl FnMut(Pending)) {
+        let (index, depth) = (part.nodes.len(), from.depth);
+        if let Some((parent, slot)) = from.parent {
+            part.nodes[parent].links[slot] = Link::node(index);
+        }
+        // Each level leaves at most seven siblings behind; one entry more is written before it is known
+        // whether it counts.
+        part.stack = part.stack.max(depth * (WIDTH - 1) + 2);
+        let mut node = Node {
             lo: [[f32::INFINITY; WIDTH]; 3],
             hi: [[f32::NEG_INFINITY; WIDTH]; 3],
             links: [Link::NONE; WIDTH],
             count: 0,
             leaves: 0,
         };
-        tree.nodes.push(empty.clone());
-        // Binary node, wide node, depth of the wide node.
-        let mut pending = vec![(0_usize, 0_usize, 1_usize)];
-        while let Some((from, to, depth)) = pending.pop() {
-            // Each level leaves at most seven siblings behind; one entry more is written before it is known
-            // whether it counts.
-            tree.stack = tree.stack.max(depth * (WIDTH - 1) + 2);
-            let children = self.children_of(from);
-            let mut node = empty.clone();
-            node.count = children.len() as u32;
-            for (slot, &child) in children.iter().enumerate() {
-                let bounds = self.boxes[child];
-                for axis in 0..3 {
-                    node.lo[axis][slot] = bounds.min[axis];
-                    node.hi[axis][slot] = bounds.max[axis];
-                }
-                node.links[slot] = if self.counts[child] as usize <= WIDTH {
-                    node.leaves |= 1 << slot;
-                    self.leaf(child, tree)
-                } else {
-                    tree.nodes.push(empty.clone());
-                    pending.push((child, tree.nodes.len() - 1, depth + 1));
-                    Link::node(tree.nodes.len() - 1)
-                };
+        for (slot, (child, is_large)) in self.children_of(from.binary).into_iter().enumerate() {
+            node.count += 1;
+            if is_large {
+                inner(Pending { binary: child, parent: Some((index, slot)), depth: depth + 1 });
+                continue;
             }
-            tree.nodes[to] = node;
+            let (bounds, link) = self.leaf(child, part);
+            for axis in 0..3 {
+                node.lo[axis][slot] = bounds.min[axis];
+                node.hi[axis][slot] = bounds.max[axis];
+            }
+            node.links[slot] = link;
+            node.leaves |= 1 << slot;
         }
+        part.nodes.push(node);
     }
 
     /// Up to eight descendants of a binary node that together hold all its triangles, got by opening the
-    /// largest again and again.
-    fn children_of(&self, node: usize) -> Vec<usize> {
+    /// largest again and again; and whether each holds more than a leaf does.
+    fn children_of(&self, node: usize) -> Vec<(usize, bool)> {
         let mut children = Vec::with_capacity(WIDTH);
-        children.push(node);
+        children.push((node, self.is_large(node)));
         while children.len() < WIDTH {
-            let area = |&child: &usize| self.binary.nodes[child].aabb().half_area();
+            let area = |&child: &usize| {
+                let (node, _): (usize, bool) = children[child];
+                self.binary.nodes[node].aabb().half_area()
+            };
             let largest = (0..children.len())
-                .filter(|&i| self.counts[children[i]] as usize > WIDTH && !self.is_binary_leaf(children[i]))
-                .max_by(|&a, &b| area(&children[a]).total_cmp(&area(&children[b])));
+                .filter(|&i| children[i].1 && !self.binary.nodes[children[i].0].is_leaf())
+                .max_by(|a, b| area(a).total_cmp(&area(b)));
             let Some(largest) = largest else { break };
-            let first = self.binary.nodes[children[largest]].first_index as usize;
-            children[largest] = first;
-            children.push(first + 1);
+            let first = self.binary.nodes[children[largest].0].first_index as usize;
+            children[largest] = (first, self.is_large(first));
+            children.push((first + 1, self.is_large(first + 1)));
         }
         children
     }
 
-    fn is_binary_leaf(&self, node: usize) -> bool {
-        self.binary.nodes[node].is_leaf()
+    /// Whether a binary node holds more triangles than a leaf does.
+    fn is_large(&self, node: usize) -> bool {
+        let (mut pending, mut waiting, mut found) = ([node; WIDTH + 1], 1, 0);
+        while waiting > 0 {
+            waiting -= 1;
+            let node = &self.binary.nodes[pending[waiting]];
+            if node.is_leaf() {
+                found += node.prim_count as usize;
+            } else {
+                let first = node.first_index as usize;
+                pending[waiting..waiting + 2].copy_from_slice(&[first, first + 1]);
+                waiting += 2;
+            }
+            // There is one in each that waits.
+            if found + waiting > WIDTH {
+                return true;
+            }
+        }
+        false
     }
 
-    /// Makes a leaf of all triangles below a binary node.
-    fn leaf(&self, node: usize, tree: &mut Tree) -> Link {
-        let mut lanes = [0; WIDTH];
-        let mut count = 0;
-        let mut pending = Vec::with_capacity(2 * WIDTH);
-        pending.push(node);
-        while let Some(index) = pending.pop() {
-            let node = &self.binary.nodes[index];
+    /// Makes a leaf of all triangles below a binary node. Its box is exact.
+    fn leaf(&self, node: usize, part: &mut Part) -> (Aabb, Link) {
+        let (mut lanes, mut count, mut bounds) = ([0; WIDTH], 0, Aabb::EMPTY);
+        let (mut pending, mut waiting) = ([node; WIDTH + 1], 1);
+        while waiting > 0 {
+            waiting -= 1;
+            let node = &self.binary.nodes[pending[waiting]];
             let first = node.first_index as usize;
             if node.is_leaf() {
                 for &slot in &self.binary.primitive_indices[first..first + node.prim_count as usize] {
                     lanes[count] = self.ids[slot as usize];
+                    bounds = (self.corners)(lanes[count]).into_iter().fold(bounds, Aabb::with_point);
                     count += 1;
                 }
             } else {
-                pending.extend([first + 1, first]);
+                pending[waiting..waiting + 2].copy_from_slice(&[first + 1, first]);
+                waiting += 2;
             }
         }
         let first = lanes[0];
         lanes[count..].fill(first);
-        tree.triangles.push(lanes);
-        Link::leaf(tree.triangles.len() - 1, count)
+        part.triangles.push(lanes);
+        (bounds, Link::leaf(part.triangles.len() - 1, count))
     }
 }
 
