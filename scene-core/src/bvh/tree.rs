@@ -1,6 +1,6 @@
 //! The tree that rays walk: eight children a node, up to eight triangles a leaf, both laid out for SIMD.
 //!
-//! `obvhs` builds a binary tree of high quality (parallel locally-ordered clustering with reinsertion). It is
+//! `obvhs` builds a binary tree (parallel locally-ordered clustering with reinsertion). It is
 //! collapsed here to eight children a node, so that one vector operation tests all of them, and every subtree
 //! of at most eight triangles becomes one leaf, whose triangles are tested together too.
 //!
