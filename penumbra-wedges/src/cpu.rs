@@ -105,30 +105,38 @@ impl Bounds {
     fn is_empty(&self) -> bool {
         self.min.x > self.max.x
     }
+
+    /// Middle and half size.
+    #[inline(always)]
+    fn middle(&self) -> (DVec3, DVec3) {
+        ((self.min + self.max) * 0.5, (self.max - self.min) * 0.5)
+    }
 }
 
 /// Puts into `kept` those of `edges` whose wedges touch a box.
 #[inline(always)]
 fn keep(wedges: &[Wedge], edges: impl Iterator<Item = u32>, bounds: &Bounds, kept: &mut Vec<u32>) {
-    let (center, half) = ((bounds.min + bounds.max) * 0.5, (bounds.max - bounds.min) * 0.5);
+    let (center, half) = bounds.middle();
     kept.clear();
     if !bounds.is_empty() {
         kept.extend(edges.filter(|&edge| wedges[edge as usize].touches(center, half)));
     }
 }
 
-/// The same for those of all edges whose groups the box's shaft does not miss.
+/// The same for those of all edges whose groups the box's shaft does not miss, until there are more than `most`.
 #[inline(always)]
-fn keep_by_shaft(wedges: &Wedges, groups: &EdgeGroups, bounds: &Bounds, kept: &mut Vec<u32>) {
-    let (center, half) = ((bounds.min + bounds.max) * 0.5, (bounds.max - bounds.min) * 0.5);
+fn keep_by_shaft(wedges: &Wedges, groups: &EdgeGroups, bounds: &Bounds, most: usize, kept: &mut Vec<u32>) {
+    let (center, half) = bounds.middle();
     kept.clear();
-    if !bounds.is_empty() {
-        let shaft = Shaft::new(&wedges.light, center, half);
-        groups.visit(&shaft, wedges.wedges.len(), |edge| {
-            if wedges.wedges[edge].touches(center, half) {
-                kept.push(edge as u32);
-            }
-        });
+    if bounds.is_empty() {
+        return;
+    }
+    let shaft = Shaft::new(&wedges.light, center, half);
+    for group in groups.not_missed(&shaft, wedges.wedges.len()) {
+        kept.extend(group.filter(|&edge| wedges.wedges[edge].touches(center, half)).map(|edge| edge as u32));
+        if kept.len() > most {
+            return;
+        }
     }
 }
 
@@ -224,6 +232,7 @@ impl Strip<'_> {
         }
         let whole = bounds.iter().fold(Bounds::EMPTY, |sum, tile| sum.with(*tile));
         let groups = exact.wedges.groups.as_ref();
+        let dense = self.dense();
         if groups.is_none() {
             keep(wedges, 0..wedges.len() as u32, &whole, of_strip);
         }
@@ -234,14 +243,16 @@ impl Strip<'_> {
             }
             for (tile, bounds) in tiles.iter().enumerate() {
                 if let Some(groups) = groups {
-                    keep_by_shaft(exact.wedges, groups, bounds, of_tile);
+                    keep_by_shaft(exact.wedges, groups, bounds, dense, of_tile);
                 } else {
                     keep(wedges, of_run.iter().copied(), bounds, of_tile);
                 }
                 if !bounds.is_empty() {
                     scratch.work.tiles += 1;
                     scratch.work.free_tiles += u64::from(of_tile.is_empty());
-                    scratch.work.wedges_left_out += (wedges.len() - of_tile.len()) as u64;
+                    if of_tile.len() <= dense {
+                        scratch.work.wedges_left_out += (wedges.len() - of_tile.len()) as u64;
+                    }
                 }
                 let first = (run * RUN + tile) * TILE;
                 members.clear();
@@ -263,9 +274,15 @@ impl Strip<'_> {
         }
     }
 
-    /// Shades a tile's receivers, halved by place as long as that may leave out edges: a tile often sees two surfaces far
-    /// apart, or leaves. `edges` holds the tile's, and lists of parts behind them. With `all` receivers are asked about these
-    /// edges instead; the parts that are traced stay those: a sample on an edge may be counted otherwise than it is traced.
+    /// Edges above which receivers are traced.
+    fn dense(&self) -> usize {
+        let may_trace = self.params.rays && matches!(self.answer, Answer::Exact(_));
+        if may_trace { EDGES_A_RAY * self.answer.as_exact().wedges.patterns[0].count } else { usize::MAX }
+    }
+
+    /// Shades a tile's receivers: traced where they have many edges, else halved by place as long as that may leave out some, for a
+    /// tile often sees two surfaces far apart. `edges` holds the tile's, and lists of parts behind them. With `all` receivers are
+    /// asked about these edges instead; those that are traced stay so: a sample on an edge may be counted otherwise than it is traced.
     #[inline(always)]
     fn shade_parts(
         &self,
@@ -278,8 +295,13 @@ impl Strip<'_> {
     ) {
         let exact = self.answer.as_exact();
         let wedges = &exact.wedges.wedges;
-        let dense = EDGES_A_RAY * exact.wedges.patterns[0].count;
-        let may_trace = self.params.rays && matches!(self.answer, Answer::Exact(_));
+        if edges.len() > self.dense() {
+            for (pixel, receiver) in &*members {
+                scratch.work.asked += 1;
+                values[*pixel as usize] = exact.traced(receiver, scratch);
+            }
+            return;
+        }
         parts.clear();
         parts.push(Part { first: 0, end: members.len(), from: 0, to: edges.len() });
         while let Some(Part { first, end, from, to }) = parts.pop() {
@@ -290,7 +312,7 @@ impl Strip<'_> {
                 let place = receiver.place();
                 sum.with(Bounds { min: place, max: place })
             });
-            let (center, half) = ((bounds.min + bounds.max) * 0.5, (bounds.max - bounds.min) * 0.5);
+            let (center, half) = bounds.middle();
             let start = edges.len();
             for place in from..to {
                 let edge = edges[place];
@@ -316,12 +338,8 @@ impl Strip<'_> {
                 }
             }
             for (pixel, receiver) in &*members {
-                values[*pixel as usize] = if may_trace && found > dense {
-                    scratch.work.asked += 1;
-                    exact.traced(receiver, scratch)
-                } else {
-                    self.answer.visibility(receiver, all.unwrap_or(&edges[start..]), scratch)
-                };
+                let edges = all.unwrap_or(&edges[start..]);
+                values[*pixel as usize] = self.answer.visibility(receiver, edges, scratch);
             }
         }
     }

@@ -5,6 +5,8 @@
 //! Fourteen planes touch both, each across one direction around the way to the light; two lie behind the receivers and
 //! behind the light.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use crate::area_light::{AreaLight, LightShape};
@@ -117,21 +119,19 @@ impl EdgeGroups {
         Self { groups, larger }
     }
 
-    /// Calls `with` for each edge of groups that the shaft does not miss, in order.
+    /// The groups of `edges` edges that the shaft does not miss, in order.
     #[inline(always)]
-    pub fn visit(&self, shaft: &Shaft, edges: usize, mut with: impl FnMut(usize)) {
-        for (index, [center, half]) in self.larger.iter().enumerate() {
-            if shaft.misses(*center, *half) {
-                continue;
-            }
-            let first = index * GROUP;
-            for group in first..(first + GROUP).min(self.groups.len()) {
-                let [center, half] = self.groups[group];
-                if !shaft.misses(center, half) {
-                    (group * GROUP..(group * GROUP + GROUP).min(edges)).for_each(&mut with);
-                }
-            }
-        }
+    pub fn not_missed<'a>(
+        &'a self,
+        shaft: &'a Shaft,
+        edges: usize,
+    ) -> impl Iterator<Item = Range<usize>> + 'a {
+        let is_missed = |[center, half]: [DVec3; 2]| shaft.misses(center, half);
+        let larger = (0..self.larger.len()).filter(move |&index| !is_missed(self.larger[index]));
+        larger
+            .flat_map(|index| index * GROUP..((index + 1) * GROUP).min(self.groups.len()))
+            .filter(move |&group| !is_missed(self.groups[group]))
+            .map(move |group| group * GROUP..((group + 1) * GROUP).min(edges))
     }
 
     /// Bytes held.
