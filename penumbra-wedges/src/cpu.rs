@@ -3,8 +3,9 @@
 //! The image is cut into tiles of 8 × 8 pixels. What a tile sees is in a box, and a wedge outside of that box changes none of its
 //! pixels; the others are asked again for each pixel (Szabó, 7.8: a stencil there, half-spaces here, which are
 //! stricter, since they bound the wedge on all sides). Most edges are left out in runs, by the tile's [`Shaft`]; for
-//! `interpolated`, whose wedges are wider, by boxes of whole strips of tiles and of runs of eight tiles first. Only pixels inside of a wedge run the inner loop of [`exact`](crate::exact),
-//! [`coverage`](crate::coverage) or [`interpolated`](crate::interpolated).
+//! `interpolated`, whose wedges are wider, by boxes of whole strips of tiles and of runs of eight tiles first. Only pixels inside of a
+//! wedge run the inner loop of [`exact`](crate::exact), [`coverage`](crate::coverage) or [`interpolated`](crate::interpolated). A tile in
+//! very many wedges is traced, as in foliage: to find those of its pixels alone would take longer, too.
 
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
@@ -27,7 +28,7 @@ pub const TILE: usize = 8;
 /// Tiles of a run.
 const RUN: usize = 8;
 
-/// Edges for each sample of the light above which the pixels of a part of a tile are traced. It decides about time alone. Measured
+/// Edges for each sample of the light above which the pixels of a tile are traced. It decides about time alone. Measured
 /// (README, `--example what_culling_saves -- rays`): with up to four times as many edges as samples counting takes 0.89 of the time of
 /// tracing, with up to eight 1.14.
 pub const EDGES_A_RAY: usize = 4;
