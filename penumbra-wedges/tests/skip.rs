@@ -45,14 +45,14 @@ fn wedges_are_left_out_for_tiles_and_pixels() {
 #[test]
 fn the_same_pixels_are_traced() {
     let setup = scenes::build("park:leaves=300", 0.0).expect("built in");
-    let camera = setup.camera.with_size(32, 24);
+    let camera = setup.camera.with_size(64, 48);
     let gbuffer = raster::render_gbuffer(&setup.scene, &camera);
     let casters = Casters::new(&setup.scene).expect("few triangles");
     let [with, without] = [true, false].map(|skip| {
-        let params = WedgeParams { skip, views: 16, ..Default::default() };
+        let params = WedgeParams { skip, views: 64, ..Default::default() };
         let (prepared, _) =
             PenumbraWedges::new(params).prepare(&casters, &setup.lights[0], &camera).expect("in its limits");
-        prepared.shade_and_count(&gbuffer, &mut VisibilityImage::new(32, 24)).1
+        prepared.shade_and_count(&gbuffer, &mut VisibilityImage::new(64, 48)).1
     });
     assert!(with.traced > 0 && with.traced < with.asked, "{with:?}");
     assert_eq!(with.traced, without.traced);

@@ -47,11 +47,10 @@ impl LightCone {
                     return None;
                 }
                 let (u, v) = (w / distance).any_orthonormal_pair();
-                // The tangents' length, and what it is of the distance.
-                let tangent = ((distance - radius) * (distance + radius)).sqrt();
                 let sine = radius / distance;
-                let height = sine * sine / (1.0 + tangent / distance);
-                let radius = radius * distance / tangent;
+                let cosine = ((1.0 - sine) * (1.0 + sine)).sqrt();
+                let height = sine * sine / (1.0 + cosine);
+                let radius = sine / cosine * distance;
                 (u * radius, v * radius, w, true, height)
             }
             Light::Rect { center, half_u, half_v } => (half_u, half_v, center - receiver, false, 0.0),
@@ -119,7 +118,7 @@ impl LightCone {
         // tan² = h·(2 − h)/(1 − h)² of h = r²·height, over the same for r = 1.
         let lower = point.length_squared() * self.height;
         let (inner, outer) = (1.0 - lower, 1.0 - self.height);
-        let ratio = (2.0 - lower) / (2.0 - self.height) * (outer / inner).powi(2);
+        let ratio = (2.0 - lower) / (2.0 - self.height) * (outer / inner) * (outer / inner);
         point * ratio.max(0.0).sqrt()
     }
 
