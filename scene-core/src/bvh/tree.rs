@@ -170,7 +170,7 @@ fn build_binary(ids: &[u32], corners: &(impl Fn(u32) -> [Vec3; 3] + Sync), bound
             obvhs::aabb::Aabb::new(low, high)
         })
         .collect();
-    // Leaves are formed below, so the builder keeps one triangle a leaf. A medium build takes half as long again, and rays of
+    // Leaves are formed below, from one triangle a leaf of the builder's. A medium build takes half as long again, and rays of
     // neither are told apart by their time.
     let mut params = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::fast_build() };
     // Boxes that cover the whole a thousand times over cannot be parted by any tree, and looking for better
@@ -208,6 +208,12 @@ struct Pending {
     /// The wide node above it in its part, and its slot there.
     parent: Option<(usize, usize)>,
     depth: usize,
+}
+
+/// Up to eight triangles; unused lanes repeat the first.
+struct Leaf {
+    lanes: [u32; WIDTH],
+    count: usize,
 }
 
 impl Part {
@@ -289,88 +295,66 @@ impl<C: Fn(u32) -> [Vec3; 3] + Sync> Collapse<'_, C> {
             count: 0,
             leaves: 0,
         };
-        for (slot, (child, is_large)) in self.children_of(from.binary).into_iter().enumerate() {
+        for (slot, (child, leaf)) in self.children_of(from.binary).into_iter().enumerate() {
             node.count += 1;
-            if is_large {
+            let Some(Leaf { lanes, count }) = leaf else {
                 inner(Pending { binary: child, parent: Some((index, slot)), depth: depth + 1 });
                 continue;
-            }
-            let (bounds, link) = self.leaf(child, part);
+            };
+            let corners = lanes[..count].iter().flat_map(|&id| (self.corners)(id));
+            let bounds = Aabb::from_points(corners);
             for axis in 0..3 {
                 node.lo[axis][slot] = bounds.min[axis];
                 node.hi[axis][slot] = bounds.max[axis];
             }
-            node.links[slot] = link;
+            node.links[slot] = Link::leaf(part.triangles.len(), count);
             node.leaves |= 1 << slot;
+            part.triangles.push(lanes);
         }
         part.nodes.push(node);
     }
 
     /// Up to eight descendants of a binary node that together hold all its triangles, got by opening the
-    /// largest again and again; and whether each holds more than a leaf does.
-    fn children_of(&self, node: usize) -> Vec<(usize, bool)> {
+    /// largest again and again; each with the leaf that it becomes, if one holds it.
+    fn children_of(&self, node: usize) -> Vec<(usize, Option<Leaf>)> {
+        let with_leaf = |node: usize| (node, self.leaf(node));
         let mut children = Vec::with_capacity(WIDTH);
-        children.push((node, self.is_large(node)));
+        children.push(with_leaf(node));
         while children.len() < WIDTH {
-            let area = |&child: &usize| {
-                let (node, _): (usize, bool) = children[child];
-                self.binary.nodes[node].aabb().half_area()
-            };
-            let largest = (0..children.len())
-                .filter(|&i| children[i].1 && !self.binary.nodes[children[i].0].is_leaf())
-                .max_by(|a, b| area(a).total_cmp(&area(b)));
-            let Some(largest) = largest else { break };
+            let inner = (0..children.len()).filter(|&child| children[child].1.is_none());
+            let area = |&child: &usize| self.binary.nodes[children[child].0].aabb().half_area();
+            let Some(largest) = inner.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
             let first = self.binary.nodes[children[largest].0].first_index as usize;
-            children[largest] = (first, self.is_large(first));
-            children.push((first + 1, self.is_large(first + 1)));
+            children[largest] = with_leaf(first);
+            children.push(with_leaf(first + 1));
         }
         children
     }
 
-    /// Whether a binary node holds more triangles than a leaf does.
-    fn is_large(&self, node: usize) -> bool {
-        let (mut pending, mut waiting, mut found) = ([node; WIDTH + 1], 1, 0);
-        while waiting > 0 {
-            waiting -= 1;
-            let node = &self.binary.nodes[pending[waiting]];
-            if node.is_leaf() {
-                found += node.prim_count as usize;
-            } else {
-                let first = node.first_index as usize;
-                pending[waiting..waiting + 2].copy_from_slice(&[first, first + 1]);
-                waiting += 2;
-            }
-            // There is one in each that waits.
-            if found + waiting > WIDTH {
-                return true;
-            }
-        }
-        false
-    }
-
-    /// Makes a leaf of all triangles below a binary node. Its box is exact.
-    fn leaf(&self, node: usize, part: &mut Part) -> (Aabb, Link) {
-        let (mut lanes, mut count, mut bounds) = ([0; WIDTH], 0, Aabb::EMPTY);
+    /// All triangles below a binary node; `None` if they are more than a leaf holds.
+    fn leaf(&self, node: usize) -> Option<Leaf> {
+        let (mut lanes, mut count) = ([0; WIDTH], 0);
         let (mut pending, mut waiting) = ([node; WIDTH + 1], 1);
         while waiting > 0 {
             waiting -= 1;
             let node = &self.binary.nodes[pending[waiting]];
             let first = node.first_index as usize;
             if node.is_leaf() {
-                for &slot in &self.binary.primitive_indices[first..first + node.prim_count as usize] {
-                    lanes[count] = self.ids[slot as usize];
-                    bounds = (self.corners)(lanes[count]).into_iter().fold(bounds, Aabb::with_point);
-                    count += 1;
-                }
+                debug_assert_eq!(node.prim_count, 1, "asked of the builder");
+                lanes[count] = self.ids[self.binary.primitive_indices[first] as usize];
+                count += 1;
             } else {
                 pending[waiting..waiting + 2].copy_from_slice(&[first + 1, first]);
                 waiting += 2;
             }
+            // There is one in each that waits.
+            if count + waiting > WIDTH {
+                return None;
+            }
         }
         let first = lanes[0];
         lanes[count..].fill(first);
-        part.triangles.push(lanes);
-        (bounds, Link::leaf(part.triangles.len() - 1, count))
+        Some(Leaf { lanes, count })
     }
 }
 
