@@ -1,5 +1,7 @@
 //! Things dealt to buckets, so that what belongs together is worked on together: in a core's cache, and bucket by bucket in parallel.
 
+use std::ops::Range;
+
 /// Buckets at most, so that what a chunk of some ten thousand things has of each is still some cache lines long.
 pub(super) const MOST_BUCKETS: usize = 2048;
 
@@ -31,8 +33,23 @@ impl<T: Copy + Default> Dealt<T> {
 
     /// The things of a bucket.
     pub(super) fn bucket(&self, bucket: usize) -> &[T] {
+        &self.things[self.range(bucket)]
+    }
+
+    /// The same, to put in another order.
+    pub(super) fn bucket_mut(&mut self, bucket: usize) -> &mut [T] {
+        let range = self.range(bucket);
+        &mut self.things[range]
+    }
+
+    /// All things, bucket by bucket.
+    pub(super) fn things(&self) -> &[T] {
+        &self.things
+    }
+
+    fn range(&self, bucket: usize) -> Range<usize> {
         let begin = if bucket == 0 { 0 } else { self.ends[bucket - 1] };
-        &self.things[begin as usize..self.ends[bucket] as usize]
+        begin as usize..self.ends[bucket] as usize
     }
 }
 
@@ -45,6 +62,9 @@ mod tests {
         let dealt = Dealt::new(4, || (0..10u32).map(|thing| ((thing * 7 % 3) as usize, thing)));
         let buckets: Vec<_> = (0..4).map(|bucket| dealt.bucket(bucket)).collect();
         assert_eq!(buckets, [&[0, 3, 6, 9][..], &[1, 4, 7], &[2, 5, 8], &[]]);
+        let mut turned = dealt;
+        turned.bucket_mut(1).reverse();
+        assert_eq!(turned.things(), [0, 3, 6, 9, 7, 4, 1, 2, 5, 8]);
         assert!(Dealt::<u32>::new(1, std::iter::empty).bucket(0).is_empty());
     }
 }

@@ -101,72 +101,50 @@ impl Sides {
 
     /// What `take` makes of the edges of each bucket, in the order of their vertices.
     pub(super) fn by_bucket<R: Send>(&self, take: impl Fn(&Rows) -> R + Sync) -> Vec<R> {
-        let of_bucket = |rows: &mut Rows, bucket: usize| {
+        let of_bucket = |bucket: usize| {
             let first = bucket * self.per_bucket;
             let vertices = self.per_bucket.min(self.vertices - first);
-            rows.fill(first as u32, vertices, || self.chunks.iter().map(|chunk| chunk.bucket(bucket)));
-            take(rows)
+            let sides = || self.chunks.iter().flat_map(|chunk| chunk.bucket(bucket));
+            take(&Rows::new(first as u32, vertices, sides))
         };
-        let buckets = self.vertices.div_ceil(self.per_bucket);
-        (0..buckets).into_par_iter().map_init(Rows::default, of_bucket).collect()
+        (0..self.vertices.div_ceil(self.per_bucket)).into_par_iter().map(of_bucket).collect()
     }
 }
 
-/// Sides of one bucket.
-#[derive(Default)]
+/// Sides of one bucket, a row for each vertex.
 pub(super) struct Rows {
     first_vertex: u32,
-    /// The upper vertex above the side's name, which sorts as the pair does; row by row.
-    entries: Vec<u64>,
-    /// Where each row ends.
-    ends: Vec<u32>,
+    vertices: usize,
+    /// The upper vertex above the side's name, which sorts as the pair does.
+    entries: Dealt<u64>,
 }
 
 impl Rows {
-    fn fill<'a, I: Iterator<Item = &'a [Side]>>(
-        &mut self,
-        first_vertex: u32,
-        vertices: usize,
-        parts: impl Fn() -> I,
-    ) {
-        self.first_vertex = first_vertex;
-        self.ends.clear();
-        self.ends.resize(vertices + 1, 0);
-        for side in parts().flatten() {
-            self.ends[(side.lower - first_vertex) as usize + 1] += 1;
-        }
-        let mut count = 0;
-        for end in &mut self.ends {
-            count += *end;
-            *end = count;
-        }
-        self.entries.resize(count as usize, 0);
-        for side in parts().flatten() {
-            let cursor = &mut self.ends[(side.lower - first_vertex) as usize];
-            self.entries[*cursor as usize] = u64::from(side.upper) << 32 | u64::from(side.name);
-            *cursor += 1;
-        }
-        self.ends.truncate(vertices);
-        let mut begin = 0;
-        for &end in &self.ends {
-            self.entries[begin..end as usize].sort_unstable();
-            begin = end as usize;
-        }
+    fn new<'a, I>(first_vertex: u32, vertices: usize, sides: impl Fn() -> I) -> Self
+    where
+        I: Iterator<Item = &'a Side>,
+    {
+        let mut entries = Dealt::new(vertices, || {
+            sides().map(|&Side { lower, upper, name }| {
+                ((lower - first_vertex) as usize, u64::from(upper) << 32 | u64::from(name))
+            })
+        });
+        (0..vertices).for_each(|row| entries.bucket_mut(row).sort_unstable());
+        Self { first_vertex, vertices, entries }
     }
 
     /// Edges with their two vertices, the lower first, in order; and the names of their sides, in order, each in the lower half
     /// of a number.
     pub(super) fn edges(&self) -> impl Iterator<Item = ([u32; 2], &[u64])> {
-        let begins = std::iter::once(0).chain(self.ends.iter().copied());
-        (self.first_vertex..).zip(begins.zip(&self.ends)).flat_map(|(lower, (begin, &end))| {
-            let row = &self.entries[begin as usize..end as usize];
-            row.chunk_by(|a, b| a >> 32 == b >> 32).map(move |edge| ([lower, (edge[0] >> 32) as u32], edge))
+        (self.first_vertex..).zip(0..self.vertices).flat_map(|(lower, row)| {
+            let edges = self.entries.bucket(row).chunk_by(|a, b| a >> 32 == b >> 32);
+            edges.map(move |edge| ([lower, (edge[0] >> 32) as u32], edge))
         })
     }
 
     /// Sides of all edges.
     pub(super) fn entries(&self) -> &[u64] {
-        &self.entries
+        self.entries.things()
     }
 }
 
