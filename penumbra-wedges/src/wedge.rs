@@ -248,6 +248,29 @@ mod tests {
         }
     }
 
+    proptest! {
+        /// The same a thousand lights away from zero, where f32 loses most of the digits between them.
+        #[test]
+        fn rounding_far_from_zero_leaves_nothing_out(
+            away in prop::array::uniform3(-1000.0_f32..1000.0),
+            ends in prop::array::uniform6(-2.0_f64..2.0),
+            (u, v) in (-0.7_f64..0.7, -0.7_f64..0.7),
+            // On the edge itself, where its planes meet, every digit counts.
+            (t, sigma) in (0.0_f64..1.0, prop_oneof![Just(0.0_f64), 0.0_f64..50.0]),
+        ) {
+            let away = Vec3::from_array(away);
+            let (a, b) = (DVec3::from_slice(&ends[..3]), DVec3::from_slice(&ends[3..]));
+            let (a, b) = (a + away.as_dvec3(), b + away.as_dvec3());
+            for light in lights(away).into_iter().take(3) {
+                let wedge = Wedge::new(&light, a, b);
+                let (q, _) = point_of(&light, u, v);
+                let y = a + (b - a) * t;
+                let p = y + (y - q) * sigma;
+                prop_assert!(wedge.holds(p), "{light:?}, {a} {b}, {p}");
+            }
+        }
+    }
+
     #[test]
     fn wedges_are_bounded_on_all_sides() {
         let (a, b) = (DVec3::new(-1.0, 1.0, 0.0), DVec3::new(1.0, 1.0, 0.0));
