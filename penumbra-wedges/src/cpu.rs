@@ -248,10 +248,11 @@ impl Strip<'_> {
                 } else {
                     keep(wedges, of_run.iter().copied(), bounds, of_tile);
                 }
+                let is_traced = of_tile.len() > dense;
                 if !bounds.is_empty() {
                     scratch.work.tiles += 1;
                     scratch.work.free_tiles += u64::from(of_tile.is_empty());
-                    if of_tile.len() <= dense {
+                    if !is_traced {
                         scratch.work.wedges_left_out += (wedges.len() - of_tile.len()) as u64;
                     }
                 }
@@ -269,21 +270,28 @@ impl Strip<'_> {
                         }
                     }
                 }
+                if is_traced {
+                    for (pixel, receiver) in &*members {
+                        scratch.work.asked += 1;
+                        values[*pixel as usize] = exact.traced(receiver, scratch);
+                    }
+                    continue;
+                }
                 let asked_of_all = (!self.params.skip).then_some(&all[..]);
                 self.shade_parts(values, members, of_tile, asked_of_all, parts, scratch);
             }
         }
     }
 
-    /// Edges above which receivers are traced.
+    /// Edges above which a tile's receivers are traced, whatever is left out: a sample on an edge may be counted otherwise than it
+    /// is traced.
     fn dense(&self) -> usize {
         let may_trace = self.params.rays && matches!(self.answer, Answer::Exact(_));
         if may_trace { EDGES_A_RAY * self.answer.as_exact().wedges.patterns[0].count } else { usize::MAX }
     }
 
-    /// Shades a tile's receivers: traced where they have many edges, else halved by place as long as that may leave out some, for a
-    /// tile often sees two surfaces far apart. `edges` holds the tile's, and lists of parts behind them. With `all` receivers are
-    /// asked about these edges instead; those that are traced stay so: a sample on an edge may be counted otherwise than it is traced.
+    /// Shades a tile's receivers, halved by place as long as that may leave out edges: a tile often sees two surfaces far apart.
+    /// `edges` holds the tile's, and lists of parts behind them. With `all` receivers are asked about these edges instead.
     #[inline(always)]
     fn shade_parts(
         &self,
@@ -294,15 +302,7 @@ impl Strip<'_> {
         parts: &mut Vec<Part>,
         scratch: &mut Scratch,
     ) {
-        let exact = self.answer.as_exact();
-        let wedges = &exact.wedges.wedges;
-        if edges.len() > self.dense() {
-            for (pixel, receiver) in &*members {
-                scratch.work.asked += 1;
-                values[*pixel as usize] = exact.traced(receiver, scratch);
-            }
-            return;
-        }
+        let wedges = &self.answer.as_exact().wedges.wedges;
         parts.clear();
         parts.push(Part { first: 0, end: members.len(), from: 0, to: edges.len() });
         while let Some(Part { first, end, from, to }) = parts.pop() {
