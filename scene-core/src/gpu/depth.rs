@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use glam::Mat4;
 
+use super::chosen::{ChosenPipeline, ChosenRuns};
 use super::held::{Bound, HeldBuffer, HeldGroup, binding};
 use super::layout::DepthUniform;
 use super::pipeline::{RenderPipelineParts, render_pipeline, shader_module};
@@ -39,6 +40,9 @@ pub struct DepthTarget<'a> {
     /// If given, only triangles in these ranges are drawn, in any order; what lies outside the scene is ignored.
     /// Ranges that overlap are drawn twice.
     pub triangles: Option<&'a [Range<u32>]>,
+    /// If given, objects without a mask are drawn by these runs; `triangles` then say which of the others are. Where the pass
+    /// writes [`DepthIds::Triangle`]; else it is ignored.
+    pub chosen: Option<ChosenRuns<'a>>,
     /// Part of the view that is drawn to, as x, y, width and height in texels; all of it if not given. It must lie
     /// within.
     pub viewport: Option<[u32; 4]>,
@@ -64,6 +68,7 @@ impl<'a> DepthTarget<'a> {
             clip_from_world,
             written: None,
             triangles: None,
+            chosen: None,
             viewport: None,
             clear: true,
         }
@@ -78,8 +83,11 @@ pub struct DepthPass {
     /// What the targets were drawn with last time, in their order.
     views: Vec<(HeldBuffer, HeldGroup)>,
     bindings: SceneBindings,
+    cull: Option<wgpu::Face>,
     solid: wgpu::RenderPipeline,
     cutout: wgpu::RenderPipeline,
+    /// Once a target has some.
+    chosen: Option<ChosenPipeline>,
 }
 
 impl DepthPass {
@@ -126,7 +134,7 @@ impl DepthPass {
         let parts = RenderPipelineParts { vertex: "cutout_vertex", groups: &masked, ..parts };
         let cutout =
             render_pipeline(device, &RenderPipelineParts { fragment: Some(cutout_fragment), ..parts });
-        Self { ids, view_group, views: Vec::new(), bindings, solid, cutout }
+        Self { ids, view_group, views: Vec::new(), bindings, cull, solid, cutout, chosen: None }
     }
 
     /// Records one pass a target: the casters of `scene`. All targets are timed as `stage`.
@@ -177,25 +185,22 @@ impl DepthPass {
                     uniform.get(device, bytemuck::bytes_of(&view)).into()
                 }
             };
-            let view_group = group.get(device, &[view]);
+            let view_group = group.get(device, &[view.clone()]);
             let span = recorder.stage(stage);
             let mut pass = begin(recorder.encoder, target, ids, &span);
             pass.set_bind_group(0, &view_group, &[]);
             if self.ids != DepthIds::None {
                 pass.set_bind_group(1, &groups.triangles, &[]);
             }
-            pass.set_pipeline(&self.solid);
-            if self.ids == DepthIds::None {
-                pass.set_vertex_buffer(0, scene.positions.slice(..));
-                pass.set_index_buffer(scene.triangles.slice(..), wgpu::IndexFormat::Uint32);
-            }
-            for (range, id) in &draws.solid {
-                let vertices = 3 * range.start..3 * range.end;
-                if self.ids == DepthIds::None {
-                    pass.draw_indexed(vertices, 0, 0..1);
-                } else {
-                    pass.draw(vertices, *id..id + 1);
-                }
+            if let Some(runs) = target.chosen.as_ref().filter(|_| self.ids == DepthIds::Triangle) {
+                let make = || ChosenPipeline::new(device, &self.bindings, self.cull);
+                let chosen = self.chosen.get_or_insert_with(make);
+                pass.set_bind_group(0, &chosen.group(device, index, view, runs), &[]);
+                pass.set_pipeline(&chosen.pipeline);
+                pass.draw_indirect(runs.arguments, runs.arguments_offset);
+                pass.set_bind_group(0, &view_group, &[]);
+            } else {
+                draw_solid(&mut pass, scene, &draws.solid, self.ids, &self.solid);
             }
             let Some(cutouts) = &groups.cutouts else { continue };
             pass.set_pipeline(&self.cutout);
@@ -245,6 +250,29 @@ fn begin<'e>(
         pass.set_scissor_rect(x, y, width, height);
     }
     pass
+}
+
+/// Draws `solid`, indexed where nobody asks for ids.
+fn draw_solid(
+    pass: &mut wgpu::RenderPass<'_>,
+    scene: &GpuScene<'_>,
+    solid: &[(Range<u32>, u32)],
+    ids: DepthIds,
+    pipeline: &wgpu::RenderPipeline,
+) {
+    pass.set_pipeline(pipeline);
+    if ids == DepthIds::None {
+        pass.set_vertex_buffer(0, scene.positions.slice(..));
+        pass.set_index_buffer(scene.triangles.slice(..), wgpu::IndexFormat::Uint32);
+    }
+    for (range, id) in solid {
+        let vertices = 3 * range.start..3 * range.end;
+        if ids == DepthIds::None {
+            pass.draw_indexed(vertices, 0, 0..1);
+        } else {
+            pass.draw(vertices, *id..id + 1);
+        }
+    }
 }
 
 /// Draw calls: triangles, and the object that they are drawn as.

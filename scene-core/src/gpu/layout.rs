@@ -150,7 +150,7 @@ impl DepthUniform {
 mod tests {
     use super::*;
     use crate::assert_layout;
-    use crate::gpu::{CasterNode, shaders};
+    use crate::gpu::{CasterNode, RUN, shaders, testing};
 
     fn shader(name: &str) -> &'static str {
         shaders::ALL.iter().find(|(module, _)| *module == name).unwrap().1
@@ -167,6 +167,11 @@ mod tests {
         assert_layout!(LightUniform, shader("light"), "Light", [center, kind, axis, extent, u, sine, v]);
         assert_layout!(CasterNode, shader("caster_tree"), "Node", [low, skip, high, first, count]);
         assert_layout!(DepthUniform, shader("depth_pass"), "DepthView", [clip_from_relative, origin]);
+    }
+
+    #[test]
+    fn constants_are_those_of_the_shaders() {
+        testing::assert_constants(shader("depth_pass"), &[("RUN", f64::from(RUN))]);
     }
 
     #[test]

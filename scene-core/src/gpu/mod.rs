@@ -6,6 +6,7 @@
 //! | [`scene`] | geometry in buffers, its upload and bind groups |
 //! | [`gbuffer`] | the G-buffer pass |
 //! | [`depth`] | the shadow-depth pass |
+//! | [`chosen`] | triangles that a pass before chooses for it |
 //! | [`layers`] | depth maps as layers of one texture |
 //! | [`caster_tree`] | the casters' tree, as shaders walk it |
 //! | [`receivers`] | camera, light and G-buffer, as shaders read them |
@@ -34,6 +35,7 @@
 
 pub mod adapter;
 pub mod caster_tree;
+pub mod chosen;
 pub mod compute;
 pub mod depth;
 mod error;
@@ -56,6 +58,7 @@ pub mod visibility;
 
 pub use adapter::Gpu;
 pub use caster_tree::{CasterNode, CasterTrees};
+pub use chosen::{ChosenRuns, RUN};
 pub use compute::{ComputePass, WorkBuffer};
 pub use depth::{DepthIds, DepthPass, DepthTarget, WrittenProjection};
 pub use error::GpuError;

@@ -6,8 +6,8 @@ use std::time::Instant;
 use glam::{Affine3A, DMat4, DVec3, Mat4, Vec2, Vec3, Vec4};
 use gnomon_scene_core::geometry::{AlphaMask, ObjectFlags, Wrap};
 use gnomon_scene_core::gpu::{
-    DepthIds, DepthPass, DepthTarget, DepthUniform, GBufferPass, GBufferTargets, Gpu, Recorder, SceneBuffers,
-    StageTimer, WrittenProjection, testing,
+    ChosenRuns, DepthIds, DepthPass, DepthTarget, DepthUniform, GBufferPass, GBufferTargets, Gpu, RUN,
+    Recorder, SceneBuffers, StageTimer, WrittenProjection, filled_buffer, storage_buffer, testing,
 };
 use gnomon_scene_core::raster::render_gbuffer;
 use gnomon_scene_core::{Camera, GBuffer, Scene, TriangleMesh};
@@ -356,6 +356,49 @@ fn a_projection_that_lies_in_a_buffer_draws_the_same_map() {
         gpu.read_texture::<u32>(&depth, 0).unwrap()
     };
     assert!(map(true) == map(false));
+}
+
+/// Runs of a few triangles, and none: the floor is left out, the quad with holes is drawn as `triangles` say.
+#[test]
+fn chosen_runs_are_drawn_in_the_place_of_solid_triangles() {
+    let Some(gpu) = testing::gpu() else { return };
+    let scene = scene(Vec3::ZERO);
+    let buffers = SceneBuffers::new(&gpu.device, &scene).unwrap();
+    // Behind 256 bytes of another target's, as its arguments are.
+    let mut runs = vec![0u32; 64];
+    runs.extend([6, 7, 8, 10]);
+    let arguments = [[0u32; 4], [3 * RUN * 2, 1, 0, 0]];
+    let runs = storage_buffer(&gpu.device, "runs", bytemuck::cast_slice(&runs)).unwrap();
+    let usage = wgpu::BufferUsages::INDIRECT;
+    let arguments = filled_buffer(&gpu.device, "arguments", bytemuck::cast_slice(&arguments), usage);
+    let chosen =
+        ChosenRuns { runs: &runs, offset: 256, size: 16, arguments: &arguments, arguments_offset: 16 };
+    let none = ChosenRuns { arguments_offset: 0, ..chosen };
+    let [holes, by_ranges] = [vec![2..4], vec![2..4, 6..7, 8..10]];
+    let map = |triangles: &[std::ops::Range<u32>], chosen| -> (Vec<u32>, Vec<u32>) {
+        let [depth, ids] = depth_textures(&gpu, SIDE, 1);
+        let (depth_view, ids_view) = (layer(&depth, 0), layer(&ids, 0));
+        let target = DepthTarget {
+            ids: Some(&ids_view),
+            triangles: Some(triangles),
+            chosen,
+            ..DepthTarget::new(&depth_view, projections(Vec3::ZERO)[0])
+        };
+        let mut encoder = gpu.encoder();
+        let mut recorder = Recorder::new(&gpu.device, &gpu.queue, &mut encoder);
+        let mut pass = DepthPass::new(&gpu.device, DepthIds::Triangle, None);
+        pass.record(&mut recorder, "prepare.depth", &buffers.view(None), &[target]);
+        gpu.submit(encoder).unwrap();
+        (gpu.read_texture(&depth, 0).unwrap(), gpu.read_texture(&ids, 0).unwrap())
+    };
+    let both = map(&holes, Some(chosen));
+    assert!(both == map(&by_ranges, None));
+    assert!(map(&[], Some(chosen)) == map(&by_ranges[1..], None));
+    assert!(map(&holes, Some(none)) == map(&holes, None));
+    let seen = |triangle: u32| both.1.iter().filter(|&&id| id == triangle).count();
+    let [of_first, of_second] = [seen(6), seen(8) + seen(9)];
+    assert!(of_first > 10 && of_second > 10, "{of_first}, {of_second}");
+    assert_eq!([0, 7].map(seen), [0, 0]);
 }
 
 #[test]
