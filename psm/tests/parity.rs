@@ -7,15 +7,16 @@
 
 #![cfg(feature = "gpu")]
 
-use glam::{DVec2, DVec4, Vec3};
+use glam::{Affine3A, DVec2, DVec4, Vec3};
 use gnomon_psm::gpu::PsmOnGpu;
 use gnomon_psm::gpu::layout::ViewOnGpu;
 use gnomon_psm::warp::Warp;
 use gnomon_psm::{Parametrisation, PreparedPsm, Psm, PsmParams, Show, Variant};
+use scene_core::geometry::ObjectFlags;
 use scene_core::gpu::headless::VISIBILITY_FORMAT;
 use scene_core::gpu::{Gpu, HeadlessRun, testing};
 use scene_core::reference::valid_pixels;
-use scene_core::{Camera, GBuffer, Light, Scene, VisibilityImage, raster, scenes};
+use scene_core::{Camera, GBuffer, Light, Scene, TriangleMesh, VisibilityImage, raster, scenes};
 
 const MAP_SIZE: u32 = 256;
 
@@ -201,6 +202,39 @@ fn every_variant_and_kind_of_view() {
             }
         }
     }
+}
+
+/// Thousands of objects: what an invocation does must not grow with their number, since drivers end loops that seem endless (Mesa's
+/// after 65,535 rounds of all loops together).
+#[test]
+fn thousands_of_objects() {
+    let Some(gpu) = testing::gpu() else { return };
+    let mut scene = Scene::new();
+    let mut add = |name: &str, corners: [Vec3; 4]| {
+        let mesh = TriangleMesh::new(name, corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
+        scene.add(&mesh, Affine3A::IDENTITY, ObjectFlags::default()).expect("sound");
+    };
+    let square = |side: f32| {
+        [(-1, -1), (1, -1), (1, 1), (-1, 1)].map(|(x, z)| side * Vec3::new(x as f32, 0.0, z as f32))
+    };
+    add("ground", square(60.0));
+    for i in 0..12_000u16 {
+        let at = Vec3::new(f32::from(i % 120) - 59.5, 0.5, f32::from(i / 120) - 49.5);
+        add("leaf", square(0.2).map(|corner| at + corner));
+    }
+    let camera = Camera {
+        eye: Vec3::new(0.0, 4.0, 55.0),
+        target: Vec3::ZERO,
+        up: Vec3::Y,
+        fov_y: 0.8,
+        near: 0.1,
+        far: f32::INFINITY,
+        width: 256,
+        height: 256,
+    };
+    let light = Light::Directional { direction: Vec3::new(0.4, -1.0, 0.3), angular_radius: 0.0 };
+    let params = PsmParams { map_size: MAP_SIZE, ..Default::default() };
+    check(&gpu, &Case { name: "leaves", scene: &scene, camera: &camera, light, params });
 }
 
 /// Where resolution goes is said alike: 1/d within 1 %, which the two windows and f32 leave.

@@ -126,7 +126,7 @@ impl ImageUniform {
     }
 }
 
-/// `CasterBox` of `choice.wesl`: bounds of an object that casts, relative to the eye.
+/// `CasterBox` of `caster_boxes.wesl`: bounds of an object that casts, relative to the eye.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct BoxOnGpu {
@@ -174,7 +174,7 @@ impl ViewOnGpu {
 }
 
 /// Bytes of a `Tile` of `frame.wesl`.
-pub const TILE_BYTES: u64 = 16;
+pub const TILE_BYTES: u64 = 20;
 
 /// Bytes of a `Choice` of `frame.wesl`.
 pub const CHOICE_BYTES: u64 = 128;
@@ -214,7 +214,7 @@ mod tests {
             "LightImage",
             [x, y, w, light, along_low, along_range, papers_shift, sine, filled]
         );
-        assert_layout!(BoxOnGpu, CHOICE, "CasterBox", [low, high]);
+        assert_layout!(BoxOnGpu, SEEN, "CasterBox", [low, high]);
         assert_layout!(ViewOnGpu, VIEWS, "View", [ndc, parametrisation, shift, measure]);
         assert_eq!(struct_layout(SEEN, "Tile").1 as u64, TILE_BYTES);
         assert_eq!(struct_layout(SEEN, "Choice").1 as u64, CHOICE_BYTES);
@@ -224,7 +224,12 @@ mod tests {
     fn constants_are_those_of_the_shaders() {
         assert_constants(
             SEEN,
-            &[("GRAZING_COS", f64::from(seen::GRAZING_COS)), ("FITTERS", f64::from(FITTERS))],
+            &[
+                ("GRAZING_COS", f64::from(seen::GRAZING_COS)),
+                ("FITTERS", f64::from(FITTERS)),
+                ("caster_boxes_LEAST_PASSED", caster_boxes::LEAST),
+                ("caster_boxes_LEAN", caster_boxes::LEAN),
+            ],
         );
         assert_constants(
             CHOICE,
@@ -234,8 +239,6 @@ mod tests {
                 ("LEAST_GAIN", choice::least_gain(Lookup::Texel)),
                 ("SLACK", f64::from(seen::SLACK)),
                 ("LEAN", fitted::LEAN),
-                ("caster_boxes_LEAST_PASSED", caster_boxes::LEAST),
-                ("caster_boxes_LEAN", caster_boxes::LEAN),
                 ("caster_image_DIRECTIONS", DIRECTIONS as f64),
                 ("fitted_CHOICES", fitted::CHOICES as f64),
                 ("fitted_MOST_SAMPLES", fitted::MOST_SAMPLES as f64),
