@@ -31,6 +31,8 @@ pub fn render_maps(
             let points = clouds.chosen(scene, &view, size);
             let drawn = drawn(casters, &points.objects(), scene);
             let ranges = if params.skip { inside_map(scene, &drawn, &view, report) } else { drawn.ranges };
+            report.count("caster triangles drawn", ranges.iter().map(|range| range.len() as u64).sum());
+            report.count("points drawn", points.count() as u64);
             let options = DepthOptions { triangles: Some(&ranges), ..Default::default() };
             let mut triangles = Vec::new();
             render_depth_and_triangles_into(

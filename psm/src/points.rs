@@ -29,6 +29,9 @@ use crate::warp::at;
 /// Texels a side that a point fills.
 pub const SPLAT: i64 = 3;
 
+/// Points that a map on the GPU chooses at once.
+pub const PIECE: u32 = 64;
+
 /// A cloud has at most a point for so many of the object's triangles: for more its triangles are drawn faster.
 const TRIANGLES_A_POINT: usize = 2;
 
@@ -43,11 +46,13 @@ pub struct CloudPoint {
 
 /// The points of one object.
 #[derive(Clone, Debug)]
-struct Cloud {
-    object: usize,
+pub struct Cloud {
+    /// Its id.
+    pub object: usize,
     /// Of its surface, one side, scene units squared.
-    area: f64,
-    points: Vec<CloudPoint>,
+    pub area: f64,
+    /// Every beginning of them is spread evenly.
+    pub points: Vec<CloudPoint>,
 }
 
 /// The clouds of a scene. They hold as long as the scene does.
@@ -62,6 +67,11 @@ impl PointClouds {
         let objects = scene.objects().par_iter().enumerate();
         let marked = objects.filter(|(_, o)| o.flags.points && o.flags.casts && o.alpha.is_none());
         Self { clouds: marked.filter_map(|(id, o)| Cloud::new(scene, id, o.triangles.clone())).collect() }
+    }
+
+    /// Each object's, ids ascending.
+    pub fn clouds(&self) -> &[Cloud] {
+        &self.clouds
     }
 
     /// Whether the scene marks nothing.
@@ -186,13 +196,18 @@ impl Cloud {
             let place = sums.partition_point(|&sum| sum <= target).min(sums.len() - 1);
             let triangle = triangles.start + place;
             let [a, b, c] = scene.corners(triangle);
-            let [u, v] = square(index ^ (object as u32).wrapping_mul(0x9E37_79B1));
-            // Folded, so that it is uniform over the triangle.
-            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            let [u, v] = along(object, index);
             CloudPoint { position: a + (b - a) * u + (c - a) * v, triangle: triangle as u32 }
         };
         (count > 0).then(|| Self { object, area, points: (0..count as u32).map(point).collect() })
     }
+}
+
+/// Where on its triangle a point of an object lies: shares of the ways from the first corner to the others.
+pub fn along(object: usize, index: u32) -> [f32; 2] {
+    let [u, v] = square(index ^ (object as u32).wrapping_mul(0x9E37_79B1));
+    // Folded, so that it is uniform over the triangle.
+    if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] }
 }
 
 /// Whether all corners lie outside of a half-space.

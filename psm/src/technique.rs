@@ -6,7 +6,7 @@ use glam::Vec3;
 #[cfg(feature = "gpu")]
 use scene_core::Camera;
 #[cfg(feature = "gpu")]
-use scene_core::gpu::{GpuGBuffer, GpuShadowQuery, GpuShadowTechnique, Recorder};
+use scene_core::gpu::{Gpu, GpuGBuffer, GpuShadowQuery, GpuShadowTechnique, Recorder};
 use scene_core::technique::{
     Capability, Description, Params, PreparedShadow, ShadowQuery, ShadowTechnique, Support, TechniqueError,
     TechniqueFromParams,
@@ -86,6 +86,10 @@ impl GpuShadowTechnique for PsmOnGpu {
         visibility: &wgpu::TextureView,
     ) -> Result<Report, TechniqueError> {
         PsmOnGpu::shade(self, recorder, camera, gbuffer, visibility)
+    }
+
+    fn counted(&mut self, gpu: &Gpu) -> Result<Report, TechniqueError> {
+        PsmOnGpu::counted(self, gpu)
     }
 
     fn survives_camera(&self) -> bool {

@@ -43,3 +43,42 @@ fn skipping_changes_no_pixel() {
         assert!(left_out > 0 && dark > 0, "{spec}: {left_out} left out, {dark} dark");
     }
 }
+
+/// On the GPU, too: what is left out of a map is in none of its texels.
+#[cfg(feature = "gpu")]
+#[test]
+fn skipping_changes_no_texel_on_the_gpu() {
+    use gnomon_psm::gpu::PsmOnGpu;
+    use scene_core::gpu::headless::VISIBILITY_FORMAT;
+    use scene_core::gpu::testing;
+
+    let Some(gpu) = testing::gpu() else { return };
+    for spec in ["street", "park:leaves=800", "forest:triangles=60000,points=1"] {
+        let setup = scenes::build(spec, 1.0).expect("a built-in scene");
+        let (scene, camera) = (&setup.scene, setup.camera.with_size(96, 72));
+        let gbuffer = raster::render_gbuffer(scene, &camera);
+        let bounds = scene.bounds();
+        let inside = Light::Point { position: bounds.center() + 0.2 * bounds.size() };
+        let sun = |direction| Light::Directional { direction, angular_radius: 0.0 };
+        let (mut left_out, mut drawn) = (0, 0);
+        for light in [inside, sun(Vec3::new(0.9, -0.3, 0.2)), sun(Vec3::new(-0.4, -0.5, -1.0))] {
+            let maps = |skip| {
+                let params = PsmParams { skip, map_size: 128, ..Default::default() };
+                let mut technique = PsmOnGpu::new(&gpu.device, params, VISIBILITY_FORMAT).unwrap();
+                let run =
+                    testing::run_over(&gpu, &gbuffer, (scene, &camera, &light), &mut technique).unwrap();
+                let ids = technique.layers().ids().unwrap();
+                let layers = 0..ids.depth_or_array_layers();
+                let maps: Vec<Vec<u32>> = layers.map(|i| gpu.read_texture(ids, i).unwrap()).collect();
+                (maps, run.visibility.bits(), run.report)
+            };
+            let ((with, v_with, report), (without, v_without, all)) = (maps(true), maps(false));
+            assert!(with == without && v_with == v_without, "{spec}, {light:?}");
+            let counted = |counts: &std::collections::BTreeMap<String, u64>, name: &str| counts[name];
+            left_out += counted(&report.skipped, "caster triangles outside view")
+                - counted(&all.skipped, "caster triangles outside view");
+            drawn += counted(&report.counted, "caster triangles drawn");
+        }
+        assert!(left_out > 0 && drawn > 0, "{spec}: {left_out} left out, {drawn} drawn");
+    }
+}

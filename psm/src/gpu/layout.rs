@@ -173,6 +173,75 @@ impl ViewOnGpu {
     }
 }
 
+/// `Casters` of `casters.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+pub struct CasterUniform {
+    /// Texels a side of each map.
+    pub map_size: u32,
+    /// Room for runs, an image of the light.
+    pub runs: u32,
+    /// Room for pieces, likewise.
+    pub pieces: u32,
+    /// 1 where what lies beside a map is left out.
+    pub skips: u32,
+}
+
+/// `Run` of `casters.wesl`: triangles that follow one another.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct RunOnGpu {
+    /// Lower corner of their bounds, world space.
+    pub low: Vec3,
+    /// The first.
+    pub first: u32,
+    /// Upper corner.
+    pub high: Vec3,
+    /// Behind the last.
+    pub end: u32,
+    /// The cloud that may be drawn in their place, or [`NO_CLOUD`].
+    pub cloud: u32,
+    /// Zeros.
+    pub padding: [u32; 3],
+}
+
+/// Triangles that are drawn as such.
+pub const NO_CLOUD: u32 = u32::MAX;
+
+/// `Cloud` of `points.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct CloudOnGpu {
+    /// Lower corner of its object's bounds, world space.
+    pub low: Vec3,
+    /// Its first point.
+    pub first: u32,
+    /// Upper corner.
+    pub high: Vec3,
+    /// How many points it has.
+    pub count: u32,
+    /// Of its surface, one side.
+    pub area: f32,
+    /// Zeros.
+    pub padding: [u32; 3],
+}
+
+/// `Draws` of `casters.wesl`: what an image's map is drawn of, as arguments of indirect draws.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+pub struct DrawsOnGpu {
+    /// Vertices, 1, 0, 0.
+    pub triangles: [u32; 4],
+    /// Likewise.
+    pub points: [u32; 4],
+    /// Triangles without a mask that are drawn.
+    pub triangle_count: u32,
+    /// Points that are drawn.
+    pub point_count: u32,
+    /// Zeros.
+    pub padding: [u32; 2],
+}
+
 /// Bytes of a `Tile` of `frame.wesl`.
 pub const TILE_BYTES: u64 = 20;
 
@@ -193,11 +262,13 @@ mod tests {
     use scene_core::GBuffer;
     use scene_core::assert_layout;
     use scene_core::geometry::NO_TRIANGLE;
+    use scene_core::gpu::RUN;
     use scene_core::gpu::testing::{assert_constants, struct_layout};
     use scene_core::raster::DEPTH_POSITION_ERROR;
 
     use super::*;
-    use crate::gpu::shaders::{CHOICE, LOOKUP, SEEN, VIEWS};
+    use crate::gpu::shaders::{CASTERS, CHOICE, LOOKUP, SEEN, SPLATS, VIEWS};
+    use crate::points::PIECE;
     use crate::{Lookup, caster_boxes, choice, fitted, follow, seen, virtual_camera};
 
     #[test]
@@ -216,6 +287,10 @@ mod tests {
         );
         assert_layout!(BoxOnGpu, SEEN, "CasterBox", [low, high]);
         assert_layout!(ViewOnGpu, VIEWS, "View", [ndc, parametrisation, shift, measure]);
+        assert_layout!(CasterUniform, CASTERS, "Casters", [map_size, runs, pieces, skips]);
+        assert_layout!(RunOnGpu, CASTERS, "Run", [low, first, high, end, cloud]);
+        assert_layout!(CloudOnGpu, CASTERS, "Cloud", [low, first, high, count, area]);
+        assert_layout!(DrawsOnGpu, CASTERS, "Draws", [triangles, points, triangle_count, point_count]);
         assert_eq!(struct_layout(SEEN, "Tile").1 as u64, TILE_BYTES);
         assert_eq!(struct_layout(SEEN, "Choice").1 as u64, CHOICE_BYTES);
     }
@@ -250,6 +325,16 @@ mod tests {
                 ("warp_FAR", f64::from(FAR)),
             ],
         );
+        assert_constants(
+            CASTERS,
+            &[
+                ("RUN", f64::from(RUN)),
+                ("PIECE", f64::from(PIECE)),
+                ("NO_CLOUD", f64::from(NO_CLOUD)),
+                ("FAR", f64::from(FAR)),
+            ],
+        );
+        assert_constants(SPLATS, &[("PIECE", f64::from(PIECE))]);
         assert_constants(VIEWS, &[("warp_NEAR_FRACTION", warp::NEAR_FRACTION)]);
         assert_constants(
             LOOKUP,

@@ -10,30 +10,32 @@
 //! | `prepare.views` | `choose`, a workgroup an image of the light | the parametrisation, and a list of the tiles that may reach beyond its window |
 //! | | `fit`, workgroups that share the list | a window around each one's receivers |
 //! | | `write_views`, a workgroup an image | the projection, in a buffer that the depth pass draws by |
-//! | `prepare.maps` | the depth pass | the nearest triangle a texel |
+//! | `prepare.maps` | `choose_casters`, a workgroup an image | what is not wholly beside its map ([`casters`]) |
+//! | | the depth pass, and points over it ([`splats`]) | the nearest triangle a texel |
 //! | `shade.lookup` | full screen | V |
 //!
 //! Where lookups follow surfaces these are found once a scene (`prepare.surfaces`), from its geometry in memory. Without that, or where the
 //! device binds less than their 16 bytes a triangle in one piece, receivers are compared with one texel.
 //!
-//! All casters are drawn, since nobody on the CPU knows what a map covers: that costs time and changes no pixel.
+//! Nobody on the CPU knows what a map covers: what of the casters is drawn is chosen on the GPU, too, and each map is drawn by one
+//! call whatever it holds, one more for points, and one for each object with a mask.
 //!
 //! Positions are relative to the eye. V differs from the CPU's where the hardware's rasteriser gives a texel on a
 //! caster's outline to the other side of it, or a receiver on the border of two texels to the other one: forms are f32 here
 //! and f64 there.
 
+mod casters;
 pub mod layout;
 pub mod shaders;
-
-use std::ops::Range;
+mod splats;
 
 use gnomon_shadow_map::receiver_plane::plane_tolerance;
 use scene_core::geometry::{SurfaceTriangle, Surfaces};
 use scene_core::gpu::{
-    Bound, ComputePass, DepthIds, DepthLayers, DepthPass, DepthTarget, GeometryBuffers, GpuError, GpuGBuffer,
-    GpuScene, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings, SceneGroups,
-    SceneHandles, VisibilityPass, VisibilityPassParts, WorkBuffer, WrittenProjection, binding, binding_limit,
-    storage_buffer,
+    Bound, ComputePass, DepthIds, DepthLayers, DepthPass, DepthTarget, GeometryBuffers, Gpu, GpuError,
+    GpuGBuffer, GpuScene, GpuShadowQuery, HeldBuffer, HeldGroup, Receivers, Recorder, SceneBindings,
+    SceneGroups, SceneHandles, VisibilityPass, VisibilityPassParts, WorkBuffer, WrittenProjection, binding,
+    binding_limit, storage_buffer,
 };
 use scene_core::technique::{Params as _, TechniqueError};
 use scene_core::{Camera, Report, Scene, relevance};
@@ -42,6 +44,7 @@ use crate::seen::TileGrid;
 use crate::view_frame::ViewFrame;
 use crate::views::Images;
 use crate::{Lookup, PsmParams, lookup};
+use casters::CasterChoice;
 use layout::{
     BoxOnGpu, CHOICE_BYTES, FIT_BYTES, FITTERS, FrameUniform, ImageUniform, PROJECTION_STRIDE, TILE_BYTES,
     ViewOnGpu,
@@ -58,6 +61,7 @@ pub struct PsmOnGpu {
     written: Written,
     making: HeldGroup,
     own: HeldGroup,
+    casters: CasterChoice,
     depth: DepthPass,
     layers: DepthLayers,
     scene: SceneBindings,
@@ -128,8 +132,6 @@ struct Prepared {
     images: Images,
     tolerance: f32,
     surfaces: Option<wgpu::Buffer>,
-    /// Ranges of triangles that are drawn.
-    casters: Vec<Range<u32>>,
     scene: SceneGroups,
     drawn: SceneHandles,
 }
@@ -185,6 +187,7 @@ impl PsmOnGpu {
             },
             making,
             own,
+            casters: CasterChoice::new(device, receivers.layout()),
             depth: DepthPass::new(device, DepthIds::Triangle, None),
             layers: DepthLayers::new(DepthIds::Triangle),
             scene,
@@ -197,11 +200,11 @@ impl PsmOnGpu {
         })
     }
 
-    /// `prepare.images` and, once a scene, `prepare.surfaces`: takes over light and scene. Records nothing; the maps are drawn when it
-    /// shades.
+    /// `prepare.images` and, once a scene, `prepare.surfaces`, `prepare.points` and `prepare.runs`: takes over light and scene. Records
+    /// nothing; the maps are drawn when it shades.
     ///
     /// # Errors
-    /// None today: what the device has not enough of is told by [`shade`](Self::shade).
+    /// More casters than the device has memory for.
     pub fn prepare(
         &mut self,
         recorder: &mut Recorder<'_>,
@@ -222,16 +225,16 @@ impl PsmOnGpu {
         report.skip("casters", casters.backdrops.len() as u64);
         let surfaces = self.surfaces_of(recorder.device, &query.scene, &mut report);
         report.bytes = surfaces.as_ref().map_or(0, wgpu::Buffer::size);
-        let is_drawn = |id: usize| {
-            let object = &geometry.objects()[id];
+        let is_drawn = |id: u32| {
+            let object = &geometry.objects()[id as usize];
             !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
         };
-        let objects = query.scene.objects.iter().enumerate().filter(|(id, _)| is_drawn(*id));
+        let drawn = (0..query.scene.objects.len() as u32).filter(|&id| is_drawn(id)).collect();
+        self.casters.prepare(recorder.device, &query.scene, drawn, &mut report)?;
         self.prepared = Some(Prepared {
             images,
             tolerance: lookup::tolerance(geometry.bounds(), query.light),
             surfaces,
-            casters: objects.map(|(_, object)| object.triangles.clone()).collect(),
             scene: self.scene.groups(recorder.device, &query.scene),
             drawn: SceneHandles::new(&query.scene),
         });
@@ -310,16 +313,21 @@ impl PsmOnGpu {
         fit.record(recorder, "prepare.views", &groups, [FITTERS, 1, count as u32]);
         write_views.record(recorder, "prepare.views", &groups, of_images);
 
+        let chosen = self.casters.choose(recorder, &self.params, (&views, count), &receivers)?;
+        let chosen = chosen.ok_or_else(not_prepared)?;
         let nowhere = std::iter::repeat_n(glam::Mat4::ZERO, count as usize);
-        let targets = self.layers.targets(nowhere, Some(&prepared.casters));
+        let targets = self.layers.targets(nowhere, Some(&chosen.masked));
         let targets: Vec<_> = (0..)
             .zip(targets)
             .map(|(index, target)| DepthTarget {
                 written: Some(WrittenProjection { buffer: &projections, offset: index * PROJECTION_STRIDE }),
+                chosen: Some(chosen.triangles(index)),
                 ..target
             })
             .collect();
-        self.depth.record(recorder, "prepare.maps", &prepared.drawn.view(), &targets);
+        let scene = prepared.drawn.view();
+        self.depth.record(recorder, "prepare.maps", &scene, &targets);
+        self.casters.draw_points(recorder, &self.params, &chosen, &scene, &targets);
 
         let mut report = Report { bytes: self.layers.bytes(), ..Default::default() };
         let ids = self.layers.bound_ids().ok_or_else(not_prepared)?;
@@ -330,6 +338,14 @@ impl PsmOnGpu {
         report.bytes += tiles * (TILE_BYTES + FIT_BYTES);
         self.views = Some(views);
         Ok(report)
+    }
+
+    /// What the frame that was submitted last has drawn and left out of its maps. Waits for it.
+    ///
+    /// # Errors
+    /// What reading it back meets.
+    pub fn counted(&mut self, gpu: &Gpu) -> Result<Report, TechniqueError> {
+        Ok(self.casters.counted(gpu)?)
     }
 
     /// The maps, one a layer, and the triangles they see; for tests and whoever else wants them.
