@@ -185,7 +185,7 @@ impl DepthPass {
                     uniform.get(device, bytemuck::bytes_of(&view)).into()
                 }
             };
-            let view_group = group.get(device, &[view.clone()]);
+            let view_group = group.get(device, std::slice::from_ref(&view));
             let span = recorder.stage(stage);
             let mut pass = begin(recorder.encoder, target, ids, &span);
             pass.set_bind_group(0, &view_group, &[]);
