@@ -1,5 +1,5 @@
 //! What maps are drawn of, chosen where it is known what they cover: on the GPU. Twin of `cpu::inside_map` and of
-//! [`PointClouds::chosen`].
+//! [`PointClouds::chosen`](crate::points::PointClouds::chosen).
 //!
 //! Casters without a mask are asked by runs of triangles, and those that the scene marks by pieces of their clouds of points. What is
 //! wholly beside a map is left out; what is kept is drawn with one call for triangles and one for points, by arguments that a
@@ -8,154 +8,20 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-use scene_core::geometry::Aabb;
+use scene_core::Report;
 use scene_core::gpu::{
-    Bound, ChosenRuns, ComputePass, DepthTarget, GeometryBuffers, Gpu, GpuError, GpuObject, GpuScene,
-    HeldBuffer, HeldGroup, RUN, Recorder, WorkBuffer, binding, binding_limit, storage_buffer,
+    Bound, ChosenRuns, ComputePass, DepthTarget, Gpu, GpuError, GpuObject, GpuScene, HeldBuffer, HeldGroup,
+    Recorder, WorkBuffer, binding,
 };
-use scene_core::{Report, Scene};
 
-use super::layout::{CasterUniform, CloudOnGpu, DrawsOnGpu, NO_CLOUD, RunOnGpu};
+use super::caster_tables::{CasterTables, CloudTables};
+use super::layout::{CasterUniform, DrawsOnGpu};
 use super::shaders;
 use super::splats::SplatPass;
 use crate::PsmParams;
-use crate::points::{PIECE, PointClouds, along};
 
 /// A run or piece that was chosen: two u32.
 const CHOSEN_BYTES: u64 = 8;
-
-/// What is asked of a scene's casters, as tables on the device. They hold as long as the same objects cast.
-#[derive(Debug)]
-pub(super) struct CasterTables {
-    made_for: (GeometryBuffers, Vec<u32>),
-    runs: wgpu::Buffer,
-    run_count: u32,
-    clouds: wgpu::Buffer,
-    pieces: wgpu::Buffer,
-    piece_count: u32,
-    points: wgpu::Buffer,
-    /// Triangles in all runs.
-    triangles: u64,
-    /// Of the objects with masks.
-    masked: Arc<[Range<u32>]>,
-}
-
-/// The points of objects that are drawn.
-#[derive(Default)]
-struct CloudTables {
-    clouds: Vec<CloudOnGpu>,
-    pieces: Vec<[u32; 2]>,
-    points: Vec<[u32; 2]>,
-    /// Per object.
-    of_object: Vec<u32>,
-}
-
-impl CloudTables {
-    fn new(scene: &Scene, clouds: &PointClouds, drawn: &[u32]) -> Self {
-        let mut tables = Self { of_object: vec![NO_CLOUD; scene.objects().len()], ..Self::default() };
-        for cloud in
-            clouds.clouds().iter().filter(|cloud| drawn.binary_search(&(cloud.object as u32)).is_ok())
-        {
-            let (id, first) = (tables.clouds.len() as u32, tables.points.len() as u32);
-            let bounds = scene.objects()[cloud.object].bounds;
-            let count = cloud.points.len() as u32;
-            tables.of_object[cloud.object] = id;
-            tables.clouds.push(CloudOnGpu {
-                low: bounds.min,
-                first,
-                high: bounds.max,
-                count,
-                area: cloud.area as f32,
-                padding: [0; 3],
-            });
-            tables.pieces.extend((first..first + count).step_by(PIECE as usize).map(|point| [id, point]));
-            let points = (0..).zip(&cloud.points).map(|(index, point)| {
-                let [u, v] = along(cloud.object, index).map(|share| (share * 65_535.0).round() as u32);
-                [point.triangle, u | v << 16]
-            });
-            tables.points.extend(points);
-        }
-        tables
-    }
-}
-
-impl CasterTables {
-    /// Of the objects `drawn`, ids ascending. `clouds` are those of the scene's geometry, if that is in memory.
-    fn new(
-        device: &wgpu::Device,
-        scene: &GpuScene<'_>,
-        drawn: Vec<u32>,
-        clouds: &PointClouds,
-    ) -> Result<Self, GpuError> {
-        let mut tables =
-            scene.geometry.map(|geometry| CloudTables::new(geometry, clouds, &drawn)).unwrap_or_default();
-        // More points than the device binds are drawn by their triangles.
-        if size_of_val(tables.points.as_slice()) as u64 > binding_limit(device) {
-            tables = CloudTables::default();
-        }
-        let is_masked = |object: &GpuObject| object.has_mask && scene.cutouts.is_some();
-        let mut objects: Vec<_> = drawn
-            .iter()
-            .map(|&id| (id, &scene.objects[id as usize]))
-            .filter(|(_, object)| object.flags.casts && !object.triangles.is_empty())
-            .collect();
-        objects.sort_unstable_by_key(|(_, object)| object.triangles.start);
-        let (masked, solid): (Vec<_>, Vec<_>) =
-            objects.into_iter().partition(|(_, object)| is_masked(object));
-        let cloud_of = |id: u32| tables.of_object.get(id as usize).copied().unwrap_or(NO_CLOUD);
-        let solid: Vec<_> = solid.into_iter().map(|(id, object)| (object, cloud_of(id))).collect();
-        let runs = runs(scene, &solid);
-        Ok(Self {
-            run_count: runs.len() as u32,
-            runs: storage_buffer(device, "runs of casters", bytemuck::cast_slice(&runs))?,
-            clouds: storage_buffer(device, "clouds", bytemuck::cast_slice(&tables.clouds))?,
-            piece_count: tables.pieces.len() as u32,
-            pieces: storage_buffer(device, "pieces of clouds", bytemuck::cast_slice(&tables.pieces))?,
-            points: storage_buffer(device, "points", bytemuck::cast_slice(&tables.points))?,
-            triangles: runs.iter().map(|run| u64::from(run.end - run.first)).sum(),
-            masked: masked.into_iter().map(|(_, object)| object.triangles.clone()).collect(),
-            made_for: (GeometryBuffers::new(scene), drawn),
-        })
-    }
-
-    /// Bytes held on the device.
-    fn bytes(&self) -> u64 {
-        [&self.runs, &self.clouds, &self.pieces, &self.points].into_iter().map(wgpu::Buffer::size).sum()
-    }
-}
-
-/// Triangles of `solid`, in their order, by runs: small objects that follow one another share one if both fit into it.
-fn runs(scene: &GpuScene<'_>, solid: &[(&GpuObject, u32)]) -> Vec<RunOnGpu> {
-    let mut runs: Vec<RunOnGpu> = Vec::new();
-    for (object, cloud) in solid {
-        let Range { start, end } = object.triangles.clone();
-        let Aabb { min, max } = object.bounds;
-        if let Some(last) = runs.last_mut()
-            && (last.end, last.cloud) == (start, *cloud)
-            && end - last.first <= RUN
-        {
-            (last.end, last.low, last.high) = (end, last.low.min(min), last.high.max(max));
-            continue;
-        }
-        runs.extend((start..end).step_by(RUN as usize).map(|first| RunOnGpu {
-            low: min,
-            first,
-            high: max,
-            end: end.min(first + RUN),
-            cloud: *cloud,
-            padding: [0; 3],
-        }));
-    }
-    if let Some(geometry) = scene.geometry {
-        runs.par_iter_mut().for_each(|run| {
-            let corners = geometry.triangles()[run.first as usize..run.end as usize].iter().flatten();
-            let bounds = Aabb::from_points(corners.map(|&i| geometry.positions()[i as usize]));
-            (run.low, run.high) = (bounds.min, bounds.max);
-        });
-    }
-    runs
-}
 
 /// Chooses what each map is drawn of, and draws the points.
 #[derive(Debug)]
@@ -193,7 +59,8 @@ impl CasterChoice {
         }
     }
 
-    /// `prepare.points` and `prepare.runs`: the tables of the objects `drawn` (ids ascending), kept from the last call if they are the same.
+    /// `prepare.points` and `prepare.runs`: the tables of the objects that are `drawn`, told by their ids, kept from the last call if they
+    /// are the same.
     ///
     /// # Errors
     /// More runs or points than the device has memory for.
@@ -201,16 +68,23 @@ impl CasterChoice {
         &mut self,
         device: &wgpu::Device,
         scene: &GpuScene<'_>,
-        drawn: Vec<u32>,
+        drawn: impl Fn(u32) -> bool,
         report: &mut Report,
     ) -> Result<(), GpuError> {
-        let is_same = |tables: &CasterTables| tables.made_for.0.are_of(scene) && tables.made_for.1 == drawn;
-        if !self.tables.as_ref().is_some_and(is_same) {
+        let casts = |object: &GpuObject| object.flags.casts && !object.triangles.is_empty();
+        let casters: Vec<_> = (0..)
+            .zip(scene.objects)
+            .filter(|&(id, object)| casts(object) && drawn(id))
+            .map(|(id, object)| (id, object.clone()))
+            .collect();
+        if !self.tables.as_ref().is_some_and(|tables| tables.are_of(scene, &casters)) {
             // What was there is given back first: both together may not fit.
-            self.tables = None;
-            let clouds =
-                report.time("prepare.points", |_| scene.geometry.map(PointClouds::new).unwrap_or_default());
-            let tables = report.time("prepare.runs", |_| CasterTables::new(device, scene, drawn, &clouds))?;
+            (self.tables, self.images) = (None, 0);
+            let clouds = report.time("prepare.points", |_| {
+                scene.geometry.map(|geometry| CloudTables::new(geometry, &casters)).unwrap_or_default()
+            });
+            let tables =
+                report.time("prepare.runs", |_| CasterTables::new(device, scene, casters, clouds))?;
             self.tables = Some(tables);
         }
         report.bytes += self.tables.as_ref().map_or(0, CasterTables::bytes);

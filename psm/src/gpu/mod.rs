@@ -10,8 +10,8 @@
 //! | `prepare.views` | `choose`, a workgroup an image of the light | the parametrisation, and a list of the tiles that may reach beyond its window |
 //! | | `fit`, workgroups that share the list | a window around each one's receivers |
 //! | | `write_views`, a workgroup an image | the projection, in a buffer that the depth pass draws by |
-//! | `prepare.maps` | `choose_casters`, a workgroup an image | what is not wholly beside its map ([`casters`]) |
-//! | | the depth pass, and points over it ([`splats`]) | the nearest triangle a texel |
+//! | `prepare.maps` | `choose_casters`, a workgroup an image | what is not wholly beside its map (module `casters`) |
+//! | | the depth pass, and points over it (module `splats`) | the nearest triangle a texel |
 //! | `shade.lookup` | full screen | V |
 //!
 //! Where lookups follow surfaces these are found once a scene (`prepare.surfaces`), from its geometry in memory. Without that, or where the
@@ -24,6 +24,7 @@
 //! caster's outline to the other side of it, or a receiver on the border of two texels to the other one: forms are f32 here
 //! and f64 there.
 
+mod caster_tables;
 mod casters;
 pub mod layout;
 pub mod shaders;
@@ -229,8 +230,7 @@ impl PsmOnGpu {
             let object = &geometry.objects()[id as usize];
             !casters.backdrops.iter().any(|backdrop| std::ptr::eq(*backdrop, object))
         };
-        let drawn = (0..query.scene.objects.len() as u32).filter(|&id| is_drawn(id)).collect();
-        self.casters.prepare(recorder.device, &query.scene, drawn, &mut report)?;
+        self.casters.prepare(recorder.device, &query.scene, is_drawn, &mut report)?;
         self.prepared = Some(Prepared {
             images,
             tolerance: lookup::tolerance(geometry.bounds(), query.light),
