@@ -152,7 +152,11 @@ fn runs(scene: &GpuScene<'_>, solid: &[(&GpuObject, u32)]) -> Vec<RunOnGpu> {
     }
     if let Some(geometry) = scene.geometry {
         runs.par_iter_mut().for_each(|run| {
-            let corners = geometry.triangles()[run.first as usize..run.end as usize].iter().flatten();
+            // Of triangles that the geometry does not have the object's bounds are known.
+            let Some(triangles) = geometry.triangles().get(run.first as usize..run.end as usize) else {
+                return;
+            };
+            let corners = triangles.iter().flatten();
             let bounds = Aabb::from_points(corners.map(|&i| geometry.positions()[i as usize]));
             (run.low, run.high) = (bounds.min, bounds.max);
         });
