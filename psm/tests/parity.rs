@@ -14,7 +14,9 @@ use gnomon_psm::warp::Warp;
 use gnomon_psm::{Parametrisation, PreparedPsm, Psm, PsmParams, Show, Variant};
 use scene_core::geometry::ObjectFlags;
 use scene_core::gpu::headless::VISIBILITY_FORMAT;
-use scene_core::gpu::{Gpu, HeadlessRun, testing};
+use scene_core::gpu::{
+    GBufferTargets, Gpu, GpuObject, GpuScene, GpuShadowQuery, HeadlessRun, Recorder, SceneBuffers, testing,
+};
 use scene_core::reference::valid_pixels;
 use scene_core::{Camera, GBuffer, Light, Scene, TriangleMesh, VisibilityImage, raster, scenes};
 
@@ -303,6 +305,48 @@ fn it_is_reused_from_frame_to_frame() {
     for stage in if gpu.has_timestamps() { &stages[..] } else { &["shade.wall"] } {
         assert!(runs[1].report.stages_ms.contains_key(*stage), "{stage}: {:?}", runs[1].report);
     }
+}
+
+/// What casts may change from frame to frame while the buffers stay the same.
+#[test]
+fn an_object_that_casts_no_more_is_drawn_no_more() {
+    let Some(gpu) = testing::gpu() else { return };
+    let setup = scenes::build("chess", 0.0).unwrap();
+    let (scene, camera) = (&setup.scene, setup.camera.with_size(64, 48));
+    let buffers = SceneBuffers::new(&gpu.device, scene).unwrap();
+    let targets = GBufferTargets::new(&gpu.device, camera.width, camera.height);
+    targets.upload(&gpu.queue, &raster::render_gbuffer(scene, &camera));
+    let visibility = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: targets.surface.size(),
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: VISIBILITY_FORMAT,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+        view_formats: &[],
+    });
+    let mut technique = PsmOnGpu::new(&gpu.device, params(Variant::Psm), VISIBILITY_FORMAT).unwrap();
+    let mut drawn = |objects: &[GpuObject]| -> Vec<u32> {
+        let scene = GpuScene { objects, ..buffers.view(Some(scene)) };
+        let query = GpuShadowQuery { scene, light: &setup.lights[0], camera: &camera };
+        let mut encoder = gpu.encoder();
+        let mut recorder = Recorder::new(&gpu.device, &gpu.queue, &mut encoder);
+        technique.prepare(&mut recorder, &query).unwrap();
+        let view = visibility.create_view(&Default::default());
+        technique.shade(&mut recorder, &camera, &targets.view(), &view).unwrap();
+        gpu.submit(encoder).unwrap();
+        gpu.read_texture(technique.layers().ids().unwrap(), 0).unwrap()
+    };
+    let mut objects = buffers.view(None).objects.to_vec();
+    let first = drawn(&objects);
+    let triangle = first.iter().copied().find(|&id| id != GBuffer::NOTHING).unwrap();
+    let seen = objects.iter().position(|object| object.triangles.contains(&triangle)).unwrap();
+    let triangles = objects[seen].triangles.clone();
+    objects[seen].flags.casts = false;
+    assert!(drawn(&objects).iter().all(|id| !triangles.contains(id)));
+    objects[seen].flags.casts = true;
+    assert!(drawn(&objects) == first);
 }
 
 #[test]
