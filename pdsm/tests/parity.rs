@@ -240,17 +240,7 @@ fn what_is_missing_is_an_error() {
     let query = GpuShadowQuery { scene: buffers.view(None), light: &setup.lights[0], camera: &setup.camera };
     let error = pdsm.prepare(&mut recorder, &query).unwrap_err();
     assert!(matches!(error, TechniqueError::Unsupported { .. }), "{error}");
-    let target = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: None,
-        size: wgpu::Extent3d { width: 16, height: 16, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: VISIBILITY_FORMAT,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
-        view_formats: &[],
-    });
-    let view = target.create_view(&Default::default());
+    let view = gpu.visibility_texture(&targets).create_view(&Default::default());
     let error = pdsm.shade(&mut recorder, &setup.camera, &targets.view(), &view).unwrap_err();
     assert!(matches!(error, TechniqueError::NotPrepared { .. }), "{error}");
 }

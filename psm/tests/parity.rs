@@ -316,16 +316,7 @@ fn an_object_that_casts_no_more_is_drawn_no_more() {
     let buffers = SceneBuffers::new(&gpu.device, scene).unwrap();
     let targets = GBufferTargets::new(&gpu.device, camera.width, camera.height);
     targets.upload(&gpu.queue, &raster::render_gbuffer(scene, &camera));
-    let visibility = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: None,
-        size: targets.surface.size(),
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: VISIBILITY_FORMAT,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
-        view_formats: &[],
-    });
+    let visibility = gpu.visibility_texture(&targets);
     let mut technique = PsmOnGpu::new(&gpu.device, params(Variant::Psm), VISIBILITY_FORMAT).unwrap();
     let mut drawn = |objects: &[GpuObject]| -> Vec<u32> {
         let scene = GpuScene { objects, ..buffers.view(Some(scene)) };

@@ -113,7 +113,8 @@ impl Gpu {
         Ok(HeadlessView { gpu: self, origin, scene, camera, buffers, pass: None, targets, visibility, timer })
     }
 
-    fn visibility_texture(&self, targets: &GBufferTargets) -> wgpu::Texture {
+    /// What V of a view with these targets is written to, to be read back by [`read_visibility`](Self::read_visibility).
+    pub fn visibility_texture(&self, targets: &GBufferTargets) -> wgpu::Texture {
         self.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("visibility"),
             size: targets.surface.size(),
