@@ -227,6 +227,13 @@ mod tests {
         }
     }
 
+    /// What sees a point of the light through the edge's place `t`, `sigma` times as far behind it.
+    fn behind(light: &AreaLight, [a, b]: [DVec3; 2], [u, v]: [f64; 2], [t, sigma]: [f64; 2]) -> DVec3 {
+        let (q, at_place) = point_of(light, u, v);
+        let y = a + (b - a) * t;
+        if at_place { y + (y - q) * sigma } else { y - q * sigma }
+    }
+
     proptest! {
         /// Whatever sees the light through the edge is inside, edges across the light included.
         #[test]
@@ -239,9 +246,7 @@ mod tests {
             let (a, b) = (DVec3::from_slice(&ends[..3]), DVec3::from_slice(&ends[3..]));
             for light in lights(Vec3::from_array(center)) {
                 let wedge = Wedge::new(&light, a, b);
-                let (q, at_place) = point_of(&light, u, v);
-                let y = a + (b - a) * t;
-                let p = if at_place { y + (y - q) * sigma } else { y - q * sigma };
+                let p = behind(&light, [a, b], [u, v], [t, sigma]);
                 prop_assert!(wedge.holds(p), "{light:?}, {a} {b}, {p}");
                 prop_assert!(wedge.touches(p + 0.1, DVec3::splat(0.1001)));
             }
@@ -263,9 +268,7 @@ mod tests {
             let (a, b) = (a + away.as_dvec3(), b + away.as_dvec3());
             for light in lights(away).into_iter().take(3) {
                 let wedge = Wedge::new(&light, a, b);
-                let (q, _) = point_of(&light, u, v);
-                let y = a + (b - a) * t;
-                let p = y + (y - q) * sigma;
+                let p = behind(&light, [a, b], [u, v], [t, sigma]);
                 prop_assert!(wedge.holds(p), "{light:?}, {a} {b}, {p}");
             }
         }
