@@ -1,8 +1,8 @@
 //! The points that were chosen, drawn over the triangles. Twin of [`Chosen::draw`](crate::points::Chosen::draw).
 
 use scene_core::gpu::{
-    Bound, ChosenRuns, DepthTarget, DepthUniform, GpuScene, HeldBuffer, HeldGroup, Recorder, SceneBindings,
-    binding,
+    Bound, ChosenRuns, DepthTarget, DepthUniform, GpuScene, HeldBuffer, HeldGroup, HeldGroups, Recorder,
+    RenderPipelineParts, SceneBindings, binding, render_pipeline, shader_module,
 };
 
 use super::shaders;
@@ -14,9 +14,8 @@ pub(super) struct SplatPass {
     pipeline: wgpu::RenderPipeline,
     bindings: SceneBindings,
     reach: HeldBuffer,
-    group: HeldGroup,
     /// Of the maps, in their order.
-    groups: Vec<HeldGroup>,
+    groups: HeldGroups,
 }
 
 impl SplatPass {
@@ -25,8 +24,25 @@ impl SplatPass {
         let types = [binding::UNIFORM, binding::STORAGE, binding::STORAGE, binding::UNIFORM];
         let group = HeldGroup::new(device, "splats", stages, &types);
         let bindings = SceneBindings::new(device, stages);
-        let pipeline = splat_pipeline(device, [group.layout(), &bindings.triangles_layout]);
-        Self { pipeline, bindings, reach: HeldBuffer::uniform("reach of splats"), group, groups: Vec::new() }
+        let pipeline = render_pipeline(
+            device,
+            &RenderPipelineParts {
+                label: "splats",
+                module: &shader_module(device, "splats", shaders::SPLATS),
+                vertex: "splat_vertex",
+                fragment: Some("splat_fragment"),
+                groups: &[group.layout(), &bindings.triangles_layout],
+                vertex_buffers: &[],
+                targets: &[wgpu::TextureFormat::R32Uint],
+                cull: None,
+            },
+        );
+        Self {
+            pipeline,
+            bindings,
+            reach: HeldBuffer::uniform("reach of splats"),
+            groups: HeldGroups::new(group),
+        }
     }
 
     /// Draws `pieces` of `points` into the map `index` of `map_size` texels a side, by the projection that its `target` has in a buffer.
@@ -39,10 +55,7 @@ impl SplatPass {
         scene: &GpuScene<'_>,
         target: &DepthTarget<'_>,
     ) {
-        let (Some(view), Some(ids)) = (target.written, target.ids) else { return };
-        if self.groups.len() <= index {
-            self.groups.resize_with(index + 1, || self.group.another());
-        }
+        let Some(view) = target.written else { return };
         // A texel is 2 / map_size wide in normalised device coordinates.
         let reach = [SPLAT as f32 / map_size as f32, 0.0, 0.0, 0.0];
         let reach = self.reach.get(recorder.device, bytemuck::cast_slice(&reach));
@@ -53,74 +66,13 @@ impl SplatPass {
             points.clone().into(),
             reach.into(),
         ];
-        let group = self.groups[index].get(recorder.device, &bound);
+        let group = self.groups.get(recorder.device, index, &bound);
         let scene = self.bindings.groups(recorder.device, scene);
         let span = recorder.stage("prepare.maps");
-        let kept = wgpu::StoreOp::Store;
-        let mut pass = recorder.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("splats"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: ids,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: kept },
-            })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: target.depth,
-                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Load, store: kept }),
-                stencil_ops: None,
-            }),
-            timestamp_writes: span.render(),
-            occlusion_query_set: None,
-            multiview_mask: None,
-        });
+        let mut pass = DepthTarget { clear: false, ..*target }.begin(recorder.encoder, &span);
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.set_bind_group(1, &scene.triangles, &[]);
         pass.draw_indirect(pieces.arguments, pieces.arguments_offset);
     }
-}
-
-fn splat_pipeline(
-    device: &wgpu::Device,
-    [own, triangles]: [&wgpu::BindGroupLayout; 2],
-) -> wgpu::RenderPipeline {
-    let label = Some("splats");
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label,
-        source: wgpu::ShaderSource::Wgsl(shaders::SPLATS.into()),
-    });
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label,
-        bind_group_layouts: &[Some(own), Some(triangles)],
-        immediate_size: 0,
-    });
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label,
-        layout: Some(&layout),
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("splat_vertex"),
-            compilation_options: Default::default(),
-            buffers: &[],
-        },
-        primitive: Default::default(),
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: wgpu::TextureFormat::Depth32Float,
-            depth_write_enabled: Some(true),
-            // Reversed.
-            depth_compare: Some(wgpu::CompareFunction::Greater),
-            stencil: Default::default(),
-            bias: Default::default(),
-        }),
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("splat_fragment"),
-            compilation_options: Default::default(),
-            targets: &[Some(wgpu::TextureFormat::R32Uint.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
 }

@@ -1,6 +1,6 @@
 //! Triangles that a pass before chooses on the GPU, so that a depth map is drawn of those alone that it may see.
 
-use super::held::{Bound, HeldGroup, binding};
+use super::held::{Bound, HeldGroup, HeldGroups, binding};
 use super::pipeline::{RenderPipelineParts, render_pipeline, shader_module};
 use super::scene::SceneBindings;
 use super::shaders;
@@ -27,9 +27,8 @@ pub struct ChosenRuns<'a> {
 #[derive(Debug)]
 pub(super) struct ChosenPipeline {
     pub(super) pipeline: wgpu::RenderPipeline,
-    group: HeldGroup,
     /// Of the targets, in their order.
-    groups: Vec<HeldGroup>,
+    groups: HeldGroups,
 }
 
 impl ChosenPipeline {
@@ -50,7 +49,7 @@ impl ChosenPipeline {
                 cull,
             },
         );
-        Self { pipeline, group, groups: Vec::new() }
+        Self { pipeline, groups: HeldGroups::new(group) }
     }
 
     /// Group 0 of the target `index`.
@@ -61,10 +60,7 @@ impl ChosenPipeline {
         view: Bound,
         chosen: &ChosenRuns<'_>,
     ) -> wgpu::BindGroup {
-        if self.groups.len() <= index {
-            self.groups.resize_with(index + 1, || self.group.another());
-        }
         let runs = Bound::Part { buffer: chosen.runs.clone(), offset: chosen.offset, size: chosen.size };
-        self.groups[index].get(device, &[view, runs])
+        self.groups.get(device, index, &[view, runs])
     }
 }

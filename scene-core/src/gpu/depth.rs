@@ -73,6 +73,47 @@ impl<'a> DepthTarget<'a> {
             clear: true,
         }
     }
+
+    /// Begins the pass that draws to this target, timed by `span`: with [`ids`](Self::ids) if they are given, cleared and limited to the viewport as
+    /// it says.
+    pub fn begin<'e>(
+        &self,
+        encoder: &'e mut wgpu::CommandEncoder,
+        span: &super::StageSpan,
+    ) -> wgpu::RenderPass<'e> {
+        let ids = self.ids;
+        let nothing = wgpu::Color { r: f64::from(GBuffer::NOTHING), ..wgpu::Color::TRANSPARENT };
+        let color = ids.map(|view| wgpu::RenderPassColorAttachment {
+            view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                load: if self.clear { wgpu::LoadOp::Clear(nothing) } else { wgpu::LoadOp::Load },
+                store: wgpu::StoreOp::Store,
+            },
+        });
+        let colors = [color];
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("depth"),
+            color_attachments: if ids.is_some() { &colors } else { &[] },
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: self.depth,
+                depth_ops: Some(wgpu::Operations {
+                    load: if self.clear { wgpu::LoadOp::Clear(0.0) } else { wgpu::LoadOp::Load },
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            timestamp_writes: span.render(),
+            occlusion_query_set: None,
+            multiview_mask: None,
+        });
+        if let Some([x, y, width, height]) = self.viewport {
+            pass.set_viewport(x as f32, y as f32, width as f32, height as f32, 0.0, 1.0);
+            pass.set_scissor_rect(x, y, width, height);
+        }
+        pass
+    }
 }
 
 /// Draws depth maps of casters: its pipelines, kept from frame to frame.
@@ -187,7 +228,7 @@ impl DepthPass {
             };
             let view_group = group.get(device, std::slice::from_ref(&view));
             let span = recorder.stage(stage);
-            let mut pass = begin(recorder.encoder, target, ids, &span);
+            let mut pass = DepthTarget { ids, ..*target }.begin(recorder.encoder, &span);
             pass.set_bind_group(0, &view_group, &[]);
             if self.ids != DepthIds::None {
                 pass.set_bind_group(1, &groups.triangles, &[]);
@@ -211,45 +252,6 @@ impl DepthPass {
             }
         }
     }
-}
-
-fn begin<'e>(
-    encoder: &'e mut wgpu::CommandEncoder,
-    target: &DepthTarget<'_>,
-    ids: Option<&wgpu::TextureView>,
-    span: &super::StageSpan,
-) -> wgpu::RenderPass<'e> {
-    let nothing = wgpu::Color { r: f64::from(GBuffer::NOTHING), ..wgpu::Color::TRANSPARENT };
-    let color = ids.map(|view| wgpu::RenderPassColorAttachment {
-        view,
-        depth_slice: None,
-        resolve_target: None,
-        ops: wgpu::Operations {
-            load: if target.clear { wgpu::LoadOp::Clear(nothing) } else { wgpu::LoadOp::Load },
-            store: wgpu::StoreOp::Store,
-        },
-    });
-    let colors = [color];
-    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some("depth"),
-        color_attachments: if ids.is_some() { &colors } else { &[] },
-        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-            view: target.depth,
-            depth_ops: Some(wgpu::Operations {
-                load: if target.clear { wgpu::LoadOp::Clear(0.0) } else { wgpu::LoadOp::Load },
-                store: wgpu::StoreOp::Store,
-            }),
-            stencil_ops: None,
-        }),
-        timestamp_writes: span.render(),
-        occlusion_query_set: None,
-        multiview_mask: None,
-    });
-    if let Some([x, y, width, height]) = target.viewport {
-        pass.set_viewport(x as f32, y as f32, width as f32, height as f32, 0.0, 1.0);
-        pass.set_scissor_rect(x, y, width, height);
-    }
-    pass
 }
 
 /// Draws `solid`, indexed where nobody asks for ids.

@@ -68,6 +68,7 @@ pub use held::{Bound, HeldBuffer, HeldGroup, HeldGroups, binding};
 pub use layers::DepthLayers;
 pub use layout::{CameraUniform, DepthUniform, LightUniform};
 pub use pages::{Pages, Readers};
+pub use pipeline::{RenderPipelineParts, render_pipeline, shader_module};
 pub use receivers::Receivers;
 pub use scene::{
     GeometryBuffers, GpuCutouts, GpuObject, GpuScene, SceneBindings, SceneBuffers, SceneGroups, SceneHandles,

@@ -25,7 +25,7 @@ pub(super) fn made() -> [u64; 2] {
 }
 
 /// A shader module from linked WGSL.
-pub(super) fn shader_module(device: &wgpu::Device, label: &str, wgsl: &str) -> wgpu::ShaderModule {
+pub fn shader_module(device: &wgpu::Device, label: &str, wgsl: &str) -> wgpu::ShaderModule {
     device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(label),
         source: wgpu::ShaderSource::Wgsl(wgsl.into()),
@@ -33,22 +33,28 @@ pub(super) fn shader_module(device: &wgpu::Device, label: &str, wgsl: &str) -> w
 }
 
 /// What differs between render pipelines here: all draw triangle lists, both faces, nearest reversed depth first.
-pub(super) struct RenderPipelineParts<'a> {
-    pub(super) label: &'a str,
-    pub(super) module: &'a wgpu::ShaderModule,
-    pub(super) vertex: &'a str,
+#[derive(Clone, Copy, Debug)]
+pub struct RenderPipelineParts<'a> {
+    /// For errors and messages of the driver.
+    pub label: &'a str,
+    /// Holds both entry points.
+    pub module: &'a wgpu::ShaderModule,
+    /// Entry point of the vertex stage.
+    pub vertex: &'a str,
     /// None draws depth only.
-    pub(super) fragment: Option<&'a str>,
-    pub(super) groups: &'a [&'a wgpu::BindGroupLayout],
-    pub(super) vertex_buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
-    pub(super) targets: &'a [wgpu::TextureFormat],
-    pub(super) cull: Option<wgpu::Face>,
+    pub fragment: Option<&'a str>,
+    /// Layouts of the bind groups, from 0.
+    pub groups: &'a [&'a wgpu::BindGroupLayout],
+    /// None where vertices are read from storage.
+    pub vertex_buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
+    /// Formats of what is written beside depth.
+    pub targets: &'a [wgpu::TextureFormat],
+    /// Faces that are left out.
+    pub cull: Option<wgpu::Face>,
 }
 
-pub(super) fn render_pipeline(
-    device: &wgpu::Device,
-    parts: &RenderPipelineParts<'_>,
-) -> wgpu::RenderPipeline {
+/// Makes the pipeline, for a `Depth32Float` target.
+pub fn render_pipeline(device: &wgpu::Device, parts: &RenderPipelineParts<'_>) -> wgpu::RenderPipeline {
     let groups: Vec<_> = parts.groups.iter().copied().map(Some).collect();
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(parts.label),
