@@ -1,6 +1,10 @@
 //! Cut-out masks: textures that decide which points of a triangle exist.
 
+use std::sync::OnceLock;
+
 use glam::Vec2;
+
+use super::uncut::Holes;
 
 /// What happens to a texture coordinate outside [0, 1].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -32,13 +36,24 @@ impl Wrap {
 ///
 /// The nearest texel decides, so that ray tracer, rasteriser and GPU cut along the very same lines whatever
 /// their resolution. Texture coordinate (0, 0) is the corner of the first texel of the first row.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct AlphaMask {
     width: u32,
     height: u32,
     wrap: [Wrap; 2],
     solid: Vec<bool>,
+    /// Counted when first asked for: one mask serves many objects.
+    holes: OnceLock<Holes>,
 }
+
+impl PartialEq for AlphaMask {
+    fn eq(&self, other: &Self) -> bool {
+        let of = |mask: &Self| (mask.width, mask.height, mask.wrap);
+        of(self) == of(other) && self.solid == other.solid
+    }
+}
+
+impl Eq for AlphaMask {}
 
 impl AlphaMask {
     /// A mask of `width` × `height` texels, row by row, from alpha values in [0, 255]; solid where
@@ -51,7 +66,13 @@ impl AlphaMask {
     /// A mask of `width` × `height` texels, row by row. `None` if a side is zero or `solid` has another length.
     pub fn from_solid(width: u32, height: u32, solid: Vec<bool>, wrap: [Wrap; 2]) -> Option<Self> {
         let texels = (width as usize).checked_mul(height as usize)?;
-        (texels > 0 && solid.len() == texels).then_some(Self { width, height, wrap, solid })
+        (texels > 0 && solid.len() == texels).then(|| Self {
+            width,
+            height,
+            wrap,
+            solid,
+            holes: OnceLock::new(),
+        })
     }
 
     /// Texels a row.
@@ -76,6 +97,12 @@ impl AlphaMask {
         let x = self.wrap[0].texel((uv.x * self.width as f32).floor() as i64, w);
         let y = self.wrap[1].texel((uv.y * self.height as f32).floor() as i64, h);
         self.solid[(y * w + x) as usize]
+    }
+
+    /// Whether the surface exists all over a triangle with these texture coordinates: then the mask cuts nothing of it. `false`
+    /// where that is not certain, as within a texel of a hole.
+    pub fn leaves_whole(&self, uvs: [Vec2; 3]) -> bool {
+        self.holes.get_or_init(|| Holes::new(self)).leaves_whole(self, uvs)
     }
 
     /// Whether every texel is solid: then the mask cuts nothing and can be dropped.

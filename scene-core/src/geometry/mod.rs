@@ -11,6 +11,7 @@ mod sides;
 mod surfaces;
 mod topology;
 mod triangulate;
+mod uncut;
 mod weld;
 
 pub use aabb::Aabb;

@@ -30,16 +30,16 @@ impl Default for ObjectFlags {
     }
 }
 
-/// One instance of a mesh in the scene. Its id is its place in [`Scene::objects`].
+/// One instance of a mesh in the scene, or the part of it that a mask does not cut, or that it does. Its id is its place in [`Scene::objects`].
 #[derive(Clone, Debug)]
 pub struct Object {
     /// A name for messages and reports.
     pub name: String,
     /// Its triangles in [`Scene::triangles`].
     pub triangles: Range<usize>,
-    /// Its vertices in [`Scene::positions`].
+    /// Its vertices in [`Scene::positions`], which it may share with the object before or after it.
     pub vertices: Range<usize>,
-    /// World-space bounds of its vertices.
+    /// World-space bounds of its vertices, or of its triangles where a mesh became two objects ([`Scene::add`]).
     pub bounds: Aabb,
     /// What it takes part in.
     pub flags: ObjectFlags,
@@ -72,7 +72,7 @@ pub enum SceneError {
 
 /// All geometry of a scene in world space, flattened: what techniques and ray tracer read.
 ///
-/// Objects are contiguous ranges of triangles and vertices in the order they were added, so a triangle's
+/// Objects are contiguous ranges of triangles in the order they were added, so a triangle's
 /// object is found by binary search.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
@@ -90,6 +90,9 @@ impl Scene {
     }
 
     /// Adds `mesh` placed by `world_from_mesh` and returns the new object's id.
+    ///
+    /// A mesh with a mask that leaves some of its triangles whole ([`AlphaMask::leaves_whole`]) becomes two objects of its name,
+    /// over the same vertices: those triangles, without a mask, and then the others. The first one's id is returned.
     ///
     /// # Errors
     /// A broken mesh (by element), a position that leaves the range of f32 under the transformation, or more
@@ -118,8 +121,19 @@ impl Scene {
             self.positions.truncate(first_vertex);
             return Err(fault(MeshError::NotFinite { vertex, position }));
         }
-        let base = first_vertex as u32;
-        self.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
+        let placed = |t: &[u32; 3]| t.map(|i| i + first_vertex as u32);
+        let mask = mesh.alpha.as_ref().filter(|mask| !mask.is_opaque());
+        let mut cut = Vec::new();
+        if let Some(mask) = mask {
+            let is_whole = |t: &&[u32; 3]| mask.leaves_whole(t.map(|i| mesh.uvs[i as usize]));
+            let (whole, others): (Vec<_>, Vec<_>) = mesh.triangles.iter().partition(is_whole);
+            self.triangles.extend(whole.into_iter().map(placed));
+            cut.extend(others.into_iter().map(placed));
+        } else {
+            self.triangles.extend(mesh.triangles.iter().map(placed));
+        }
+        let first_cut = self.triangles.len();
+        self.triangles.append(&mut cut);
         // Texture coordinates exist for all vertices or, as in most scenes, for none.
         if !mesh.uvs.is_empty() && mesh.alpha.is_some() {
             self.uvs.resize(first_vertex, Vec2::ZERO);
@@ -129,15 +143,27 @@ impl Scene {
         }
         let bounds = Aabb::from_points(self.positions[first_vertex..].iter().copied());
         self.bounds = Some(self.bounds().union(bounds));
-        self.objects.push(Object {
-            name: mesh.name.clone(),
-            triangles: first_triangle..self.triangles.len(),
-            vertices: first_vertex..self.positions.len(),
-            bounds,
-            flags,
-            alpha: mesh.alpha.clone().filter(|mask| !mask.is_opaque()),
-        });
-        Ok(self.objects.len() as u32 - 1)
+        let id = self.objects.len() as u32;
+        let (whole, cut) = (first_triangle..first_cut, first_cut..self.triangles.len());
+        let mut push = |triangles: Range<usize>, alpha: Option<&Arc<AlphaMask>>, bounds: Aabb| {
+            let vertices = first_vertex..self.positions.len();
+            let (name, alpha) = (mesh.name.clone(), alpha.cloned());
+            self.objects.push(Object { name, triangles, vertices, bounds, flags, alpha });
+        };
+        if cut.is_empty() {
+            push(whole, None, bounds);
+        } else if whole.is_empty() {
+            push(cut, mask, bounds);
+        } else {
+            let own = |range: &Range<usize>| {
+                let corners = self.triangles[range.clone()].iter().flatten();
+                Aabb::from_points(corners.map(|&vertex| self.positions[vertex as usize]))
+            };
+            let bounds = [own(&whole), own(&cut)];
+            push(whole, None, bounds[0]);
+            push(cut, mask, bounds[1]);
+        }
+        Ok(id)
     }
 
     /// The same with all coordinates less `origin`, each rounded once. Coordinates that overflow become infinite.
@@ -247,6 +273,48 @@ mod tests {
         mesh.positions[1] *= 2.0;
         assert!(scene.add(&mesh, huge, ObjectFlags::default()).is_err());
         assert!(scene.positions().is_empty() && scene.objects().is_empty());
+    }
+
+    /// Of three triangles the mask cuts the second, the others are an object without it: whichever one asks for, the same corners
+    /// and texture coordinates.
+    #[test]
+    fn what_a_mask_does_not_cut_is_an_object_without_it() {
+        let at = |x: f32| [Vec3::ZERO, Vec3::X, Vec3::Y].map(|corner| corner + Vec3::X * x);
+        let mut mesh = TriangleMesh::new("leaf", [at(0.0), at(2.0), at(4.0)].concat(), vec![]);
+        mesh.triangles = (0..3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        mesh.uvs = [0.25, 0.75, 0.25].into_iter().flat_map(|u| [Vec2::new(u, 0.5); 3]).collect();
+        let mask = AlphaMask::from_solid(2, 1, vec![true, false], Default::default()).map(Arc::new);
+        mesh.alpha.clone_from(&mask);
+        let mut scene = Scene::new();
+        scene.add(&triangle(), Affine3A::IDENTITY, ObjectFlags::default()).unwrap();
+        let up = Affine3A::from_translation(Vec3::Z);
+        assert_eq!(scene.add(&mesh, up, ObjectFlags::default()), Ok(1));
+        assert_eq!(scene.add(&triangle(), up, ObjectFlags::default()), Ok(3));
+        let [_, whole, cut, _] = scene.objects() else { panic!("{:?}", scene.objects()) };
+        assert_eq!((whole.triangles.clone(), cut.triangles.clone()), (1..3, 3..4));
+        assert_eq!((&whole.name, &whole.vertices), (&cut.name, &cut.vertices));
+        assert_eq!((whole.alpha.is_none(), &cut.alpha), (true, &mask));
+        assert_eq!([1, 2, 3].map(|triangle| scene.corners(triangle)[0].x), [0.0, 4.0, 2.0]);
+        assert_eq!([1, 2, 3].map(|triangle| scene.object_of(triangle)), [1, 1, 2]);
+        assert_eq!([whole, cut].map(|o| [o.bounds.min.x, o.bounds.max.x]), [[0.0, 5.0], [2.0, 3.0]]);
+        assert_eq!(scene.uvs()[scene.triangles()[3][0] as usize], Vec2::new(0.75, 0.5));
+
+        // One object where all of it is cut, or nothing is; an empty mesh is one, too.
+        let add = |uv: Vec2, triangles: usize| {
+            let mut scene = Scene::new();
+            let mut mesh = mesh.clone();
+            mesh.uvs.fill(uv);
+            mesh.triangles.truncate(triangles);
+            scene.add(&mesh, up, ObjectFlags::default()).unwrap();
+            scene
+                .objects()
+                .iter()
+                .map(|object| (object.triangles.clone(), object.alpha.is_some()))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(add(Vec2::new(0.75, 0.5), 3), [(0..3, true)]);
+        assert_eq!(add(Vec2::new(0.25, 0.5), 3), [(0..3, false)]);
+        assert_eq!(add(Vec2::new(0.75, 0.5), 0), [(0..0, false)]);
     }
 
     #[test]
