@@ -6,6 +6,7 @@
 //! | `prepare.silhouette` | edges that are silhouettes from some point of the light, or from its middle | [`Edges`](crate::edges::Edges) |
 //! | `prepare.sides` | for `interpolated`: the side planes that neighbours share | [`Side`](crate::interpolated::Side) |
 //! | `shade.blocks` | edges against blocks of 64 × 64 pixels | `cpu`'s strips |
+//! | `shade.masks` | where there are masks, which tiles they may hide the light from | [`wedges`](crate::wedges) |
 //! | `shade.wedges` | the rest against tiles of 8 × 8 pixels, and what is left drawn for each pixel | `cpu`, [`exact`](crate::exact), [`coverage`](crate::coverage), [`interpolated`](crate::interpolated) |
 //! | `shade.rays` | one exact ray for each pixel that was counted | [`Bvh`](scene_core::bvh::Bvh) |
 //! | `shade.traced` | rays to all samples of pixels that were not | [`Exact::traced`](crate::exact::Exact::traced) |
@@ -282,6 +283,12 @@ impl PenumbraWedgesOnGpu {
         passes.list_edges.pass.record(recorder, "shade.blocks", &groups, [columns, rows, 1]);
 
         let [columns, rows] = tiles(camera, TILE);
+        if let Some(pass) = passes.find_masked.as_mut().filter(|_| uniform.nodes > uniform.solid_nodes) {
+            let own = [settings.clone(), nodes.clone(), leaves.clone(), pixels.clone()];
+            let own = pass.group.get(device, &own);
+            let groups = [Some(&own), triangles, None, receivers];
+            pass.pass.record(recorder, "shade.masks", &groups, [columns, rows, 1]);
+        }
         let own = [&shared[..], of_edges.as_slice(), std::slice::from_ref(&pixels)].concat();
         let own = passes.count.group.get(device, &own);
         let groups = [Some(&own), triangles, None, receivers];

@@ -30,6 +30,8 @@ pub(super) struct Passes {
     /// Of `interpolated`.
     pub(super) find_sides: Option<Pass>,
     pub(super) list_edges: Pass,
+    /// Of `exact`.
+    pub(super) find_masked: Option<Pass>,
     pub(super) count: Pass,
     pub(super) ask: Pass,
     pub(super) trace: Pass,
@@ -87,6 +89,8 @@ impl Passes {
         } else {
             pass("wedges layers", shaders::LAYERS, "add_layers", lit, &[READ, READ, READ, WRITE])
         };
+        let find_masked =
+            exact.then(|| pass("wedges masks", shaders::MASKS, "find_masked", lit, &[READ, READ, WRITE]));
         let count = match variant {
             Variant::Exact => {
                 pass("wedges exact", shaders::EXACT, "count", lit, &[READ, READ, READ, READ, WRITE])
@@ -154,6 +158,7 @@ impl Passes {
             extract,
             find_sides,
             list_edges,
+            find_masked,
             count,
             ask,
             trace,
