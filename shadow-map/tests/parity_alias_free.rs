@@ -103,6 +103,18 @@ fn every_built_in_scene() {
     assert!(different * 1000 <= seen, "{different} of {seen} pixels");
 }
 
+/// Triangles before many receivers, which no invocation asks alone: at this size shadows of half the facade were missing when a workgroup
+/// asked those of all of its triangles, one after the other.
+#[test]
+fn triangles_before_many_receivers() {
+    let Some(gpu) = testing::gpu() else { return };
+    let setup = scenes::build("street", 0.0).unwrap();
+    let camera = setup.camera.with_size(320, 180);
+    let found = check(&gpu, "street", &setup.scene, &camera, &setup.lights[0]);
+    println!("seen, dark, different, grazed {found:?}");
+    assert!(found[2] * 1000 <= found[0], "{found:?}");
+}
+
 /// Cones, large and small scenes, and a camera of another size from frame to frame.
 #[test]
 fn cones_scales_and_sizes() {

@@ -47,6 +47,28 @@ impl ComputePass {
         if workgroups.contains(&0) {
             return;
         }
+        let [x, y, z] = workgroups;
+        self.record_as(recorder, stage, groups, |pass| pass.dispatch_workgroups(x, y, z));
+    }
+
+    /// As [`record`](Self::record), of as many workgroups as the first three words of a buffer say when it runs.
+    pub fn record_indirect(
+        &self,
+        recorder: &mut Recorder<'_>,
+        stage: &str,
+        groups: &[Option<&wgpu::BindGroup>],
+        workgroups: &wgpu::Buffer,
+    ) {
+        self.record_as(recorder, stage, groups, |pass| pass.dispatch_workgroups_indirect(workgroups, 0));
+    }
+
+    fn record_as(
+        &self,
+        recorder: &mut Recorder<'_>,
+        stage: &str,
+        groups: &[Option<&wgpu::BindGroup>],
+        dispatch: impl FnOnce(&mut wgpu::ComputePass<'_>),
+    ) {
         let span = recorder.stage(stage);
         let mut pass = recorder.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some(self.label),
@@ -58,8 +80,7 @@ impl ComputePass {
                 pass.set_bind_group(index, *group, &[]);
             }
         }
-        let [x, y, z] = workgroups;
-        pass.dispatch_workgroups(x, y, z);
+        dispatch(&mut pass);
     }
 }
 

@@ -3,9 +3,10 @@
 //!
 //! 1. `shade.receivers`: the window around all receivers, as a light's one direction or the faces of a cube around it see them;
 //!    a count a cell; places; the receivers, sorted by cell.
-//! 2. `shade.casters`: each triangle is tested against the receivers of the cells that it covers. Those over many cells are
-//!    shared out among a workgroup.
-//! 3. `shade.lookup`: V from a bit a pixel.
+//! 2. `shade.casters`: each triangle is tested against the receivers of the cells that it covers. Those before many are listed
+//!    in slices of cells.
+//! 3. `shade.large`: these, a workgroup a slice.
+//! 4. `shade.lookup`: V from a bit a pixel.
 //!
 //! # What is exact
 //! Arithmetic is in f32, so a receiver closer to a shadow's border than rounding, about 2⁻²¹ of the largest coordinate across the
@@ -36,8 +37,11 @@ const RECEIVERS_A_CELL: f32 = 4.0;
 const MAX_SIDE: u32 = 1024;
 /// Words of `work` before those of cells.
 pub(super) const FIRST_CELL: u32 = 64;
+/// Slices of cells that there is room to list, and the first of the words that say how many workgroups go through them.
+pub(super) const MOST_LISTED: u32 = 1 << 19;
+pub(super) const WORKGROUPS: u32 = 4;
 /// Workgroups that every device dispatches along one axis.
-const MAX_GROUPS: u32 = 65_535;
+pub(super) const MAX_GROUPS: u32 = 65_535;
 
 /// The variant on one device.
 #[derive(Debug)]
@@ -55,6 +59,9 @@ pub(super) struct AliasFree {
     place_cells: ComputePass,
     place: ComputePass,
     cast: ComputePass,
+    end_list: ComputePass,
+    cast_large: ComputePass,
+    workgroups: WorkBuffer,
     first_dark: HeldBuffer,
     own: HeldGroup,
     pass: VisibilityPass,
@@ -118,6 +125,9 @@ impl AliasFree {
             place_cells: pass("place_cells"),
             place: pass("place_receivers"),
             cast: pass("cast_shadows"),
+            end_list: pass("end_list"),
+            cast_large: pass("cast_large"),
+            workgroups: WorkBuffer::with_usage("workgroups of large triangles", wgpu::BufferUsages::INDIRECT),
             group,
             first_dark: HeldBuffer::uniform("dark receivers"),
             own,
@@ -193,7 +203,8 @@ impl VariantOnGpu for AliasFree {
         let side = (pixels as f32 / RECEIVERS_A_CELL).sqrt().ceil().clamp(1.0, MAX_SIDE as f32) as u32;
         let uniform = IrregularUniform { side, width: camera.width, ..prepared.uniform };
         let first_dark = FIRST_CELL + 2 * uniform.windows * side * side;
-        let words = first_dark + pixels.div_ceil(32);
+        let first_listed = first_dark + pixels.div_ceil(32);
+        let words = first_listed + 2 * MOST_LISTED;
         let work = self.work.get(device, u64::from(words) * 4)?;
         let placed = self.placed.get(device, u64::from(pixels) * 16)?;
         let settings = self.settings.get(device, bytemuck::bytes_of(&uniform));
@@ -209,7 +220,7 @@ impl VariantOnGpu for AliasFree {
         let scene = self.scene.groups(device, &GpuScene { cutouts: Some(cutouts), ..scene });
         let groups = [Some(&own), Some(&scene.triangles), scene.cutouts.as_ref(), Some(&receivers)];
 
-        recorder.encoder.clear_buffer(&work, 0, None);
+        recorder.encoder.clear_buffer(&work, 0, Some(u64::from(first_listed) * 4));
         let all = [camera.width.div_ceil(GROUP), camera.height.div_ceil(GROUP), 1];
         let cells = [side.div_ceil(GROUP), side.div_ceil(GROUP), uniform.windows];
         let stages = [
@@ -226,6 +237,10 @@ impl VariantOnGpu for AliasFree {
         let columns = needed.min(MAX_GROUPS);
         let casts = [columns, needed.div_ceil(columns.max(1)), uniform.windows];
         self.cast.record(recorder, "shade.casters", &groups, casts);
+        self.end_list.record(recorder, "shade.large", &groups, [1; 3]);
+        let workgroups = self.workgroups.get(device, 16)?;
+        recorder.encoder.copy_buffer_to_buffer(&work, u64::from(WORKGROUPS) * 4, &workgroups, 0, 12);
+        self.cast_large.record_indirect(recorder, "shade.large", &groups, &workgroups);
 
         let first_dark = self.first_dark.get(device, bytemuck::bytes_of(&[first_dark, 0, 0, 0]));
         let own = self.own.get(device, &[first_dark.into(), work.into()]);

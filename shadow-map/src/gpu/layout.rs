@@ -298,7 +298,7 @@ mod tests {
 
     use super::*;
     use crate::cascades::MAX_CASCADES;
-    use crate::gpu::alias_free::FIRST_CELL;
+    use crate::gpu::alias_free::{FIRST_CELL, MAX_GROUPS, MOST_LISTED, WORKGROUPS};
     use crate::gpu::shaders::{
         CASCADES, HARD, IRREGULAR, MOMENTS, MULTI_VIEW, PCF, PCSS, PREPARE_DEPTHS, PREPARE_MOMENTS,
     };
@@ -362,6 +362,14 @@ mod tests {
             CASCADES,
             &[("MAX_CASCADES", MAX_CASCADES as f64), ("MARGIN", f64::from(light_views::MARGIN))],
         );
-        assert_constants(IRREGULAR, &[("FIRST_CELL", f64::from(FIRST_CELL))]);
+        assert_constants(
+            IRREGULAR,
+            &[
+                ("FIRST_CELL", f64::from(FIRST_CELL)),
+                ("MOST_LISTED", f64::from(MOST_LISTED)),
+                ("WORKGROUPS", f64::from(WORKGROUPS)),
+                ("MAX_GROUPS", f64::from(MAX_GROUPS)),
+            ],
+        );
     }
 }
