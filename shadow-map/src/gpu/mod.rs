@@ -10,7 +10,7 @@
 //! | `prepare.moments` | the windows of `moments`, along rows and then along columns |
 //! | `shade.cascades` | where depths are split, and the projections of `cascaded` |
 //! | `shade.maps` | the maps of `cascaded`, and of `multi-view` one after the other, each looked up at once |
-//! | `shade.receivers`, `shade.casters` | the irregular z-buffer of `alias-free` |
+//! | `shade.receivers`, `shade.casters`, `shade.large` | the irregular z-buffer of `alias-free` |
 //!
 //! With `view_dependent` a map holds the objects that surfaces seen by the query's camera are looked up in, and a face of a
 //! cube that nobody looks at draws nothing. Both are chosen in `prepare.views` by the CPU's bounds of what is seen, so nothing
