@@ -20,7 +20,7 @@ pub enum Wrap {
 
 impl Wrap {
     /// Maps an unbounded texel index into `0..size`.
-    fn texel(self, index: i64, size: i64) -> i64 {
+    pub(super) fn texel(self, index: i64, size: i64) -> i64 {
         match self {
             Self::Repeat => index.rem_euclid(size),
             Self::Mirror => {

@@ -121,16 +121,12 @@ impl Scene {
             self.positions.truncate(first_vertex);
             return Err(fault(MeshError::NotFinite { vertex, position }));
         }
-        let placed = |t: &[u32; 3]| t.map(|i| i + first_vertex as u32);
         let mask = mesh.alpha.as_ref().filter(|mask| !mask.is_opaque());
         let mut cut = Vec::new();
-        if let Some(mask) = mask {
-            let is_whole = |t: &&[u32; 3]| mask.leaves_whole(t.map(|i| mesh.uvs[i as usize]));
-            let (whole, others): (Vec<_>, Vec<_>) = mesh.triangles.iter().partition(is_whole);
-            self.triangles.extend(whole.into_iter().map(placed));
-            cut.extend(others.into_iter().map(placed));
-        } else {
-            self.triangles.extend(mesh.triangles.iter().map(placed));
+        for corners in &mesh.triangles {
+            let is_whole = mask.is_none_or(|mask| mask.leaves_whole(corners.map(|i| mesh.uvs[i as usize])));
+            let side = if is_whole { &mut self.triangles } else { &mut cut };
+            side.push(corners.map(|i| i + first_vertex as u32));
         }
         let first_cut = self.triangles.len();
         self.triangles.append(&mut cut);

@@ -76,32 +76,20 @@ impl Holes {
 /// The texels that an interval of unbounded ones, both ends included, is wrapped to: one range, or two around an end.
 fn texels(wrap: Wrap, [first, last]: [f64; 2], size: u32) -> [Range<usize>; 2] {
     let (all, none) = (0..size as usize, 0..0);
-    let size = f64::from(size);
-    let range = |first: f64, last: f64| first as usize..last as usize + 1;
-    match wrap {
-        Wrap::Clamp => [range(first.clamp(0.0, size - 1.0), last.clamp(0.0, size - 1.0)), none],
-        _ if last - first + 1.0 >= size => [all, none],
-        Wrap::Repeat => {
-            let (first, last) = (first.rem_euclid(size), last.rem_euclid(size));
-            if first <= last {
-                [range(first, last), none]
-            } else {
-                [range(first, size - 1.0), range(0.0, last)]
-            }
-        }
-        Wrap::Mirror => {
-            let copy = (first / size).floor();
-            if copy != (last / size).floor() {
-                return [all, none];
-            }
-            let (first, last) = (first - copy * size, last - copy * size);
-            if copy.rem_euclid(2.0) == 0.0 {
-                [range(first, last), none]
-            } else {
-                [range(size - 1.0 - last, size - 1.0 - first), none]
-            }
-        }
+    let copy = |texel: f64| (texel / f64::from(size)).floor();
+    let is_all = match wrap {
+        Wrap::Repeat => last - first + 1.0 >= size.into(),
+        Wrap::Mirror => copy(first) != copy(last),
+        Wrap::Clamp => false,
+    };
+    if is_all {
+        return [all, none];
     }
+    let [x, y] = [first, last].map(|texel| wrap.texel(texel as i64, size.into()) as usize);
+    if wrap == Wrap::Repeat && x > y {
+        return [x..all.end, 0..y + 1];
+    }
+    [x.min(y)..x.max(y) + 1, none]
 }
 
 #[cfg(test)]
