@@ -17,13 +17,13 @@
 //! long as the way, which is √(1 + λ²) times as long as it goes forwards, or more: their quotient is good to
 //! 2⁻²²·(1 + |λ|)·√(1 + λ²), below 2⁻²¹·(1 + λ²), and to 2⁻²³·|λ| more where it is a product with the inverse.
 
-use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x16};
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
 use glam::{Vec3, Vec4};
 use scene_core::geometry::Aabb;
 use scene_core::light::{LightHull, LightPoint};
 
 use crate::lanes::LANES;
-use crate::tile_edges::dot;
+use crate::vectors::{dot, length, splat, sub};
 
 /// λ is lowered by this times 1 + λ².
 pub(crate) const TILT: f32 = 1.0 / 65_536.0;
@@ -59,29 +59,26 @@ impl Beam {
             y[i] = if i & 2 == 0 { bounds.min.y } else { bounds.max.y };
             z[i] = if i & 4 == 0 { bounds.min.z } else { bounds.max.z };
         }
-        let (x, y) = (f32x16::load_array_ref(simd, &x), f32x16::load_array_ref(simd, &y));
-        let z = f32x16::load_array_ref(simd, &z);
+        let corners = [
+            f32x16::load_array_ref(simd, &x),
+            f32x16::load_array_ref(simd, &y),
+            f32x16::load_array_ref(simd, &z),
+        ];
         let (most, least) = (f32::NEG_INFINITY, f32::INFINITY);
         let mut greatest = [f32x16::splat(simd, most), f32x16::splat(simd, most)];
         let mut smallest = [f32x16::splat(simd, least), f32x16::splat(simd, least)];
         for &light in lights {
             let way = match light {
-                LightPoint::At(place) => {
-                    let place = place - origin;
-                    [place.x - x, place.y - y, place.z - z]
-                }
-                LightPoint::Towards(way) => {
-                    [f32x16::splat(simd, way.x), f32x16::splat(simd, way.y), f32x16::splat(simd, way.z)]
-                }
+                LightPoint::At(place) => sub(splat(simd, place - origin), corners),
+                LightPoint::Towards(way) => splat(simd, way),
             };
-            let forwards = dot(axis, way);
-            let length = (way[0] * way[0] + way[1] * way[1] + way[2] * way[2]).sqrt();
+            let forwards = dot(splat(simd, axis), way);
             // NaN leads nowhere.
-            if forwards.simd_gt(length * TILT).to_bitmask() != (1 << LANES) - 1 {
+            if forwards.simd_gt(length(way) * TILT).to_bitmask() != (1 << LANES) - 1 {
                 return None;
             }
             let inverse = f32x16::splat(simd, 1.0) / forwards;
-            let slopes = [dot(u, way) * inverse, dot(v, way) * inverse];
+            let slopes = [dot(splat(simd, u), way) * inverse, dot(splat(simd, v), way) * inverse];
             greatest = [greatest[0].max(slopes[0]), greatest[1].max(slopes[1])];
             smallest = [smallest[0].min(slopes[0]), smallest[1].min(slopes[1])];
         }

@@ -12,17 +12,17 @@
 //! of products of f32, good to 2⁻²² of their terms, are then good to 2⁻¹⁶. A sign is taken to be known beyond 2⁻¹² of the
 //! terms.
 
-use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x16};
+use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x16};
 use glam::Vec3;
-use gnomon_shadow_map::light_maps::Receiver;
 use scene_core::Light;
 use scene_core::geometry::Aabb;
 use scene_core::light::LightPoint;
 
 use crate::chosen::Chosen;
-use crate::coverage::{Site, is_left};
-use crate::lanes::{Lanes, load_three};
-use crate::tile_edges::cross;
+use crate::coverage::is_left;
+use crate::lanes::{LANES, Lanes, load_three};
+use crate::sites::{SiteVector, Sites, by_receivers};
+use crate::vectors::{Vec3x16, cross, dot, length, splat, sub};
 
 /// Below this cosine between a flat light's normal and the way to it nothing is taken to be known of a block.
 const FLATTEST: f32 = 1.0 / 64.0;
@@ -33,6 +33,39 @@ const KNOWN: f32 = 1.0 / 4096.0;
 /// Numbers a face: three corners from the origin; a corner in world space, the normal, its length; 1 if the light sees the side
 /// that the normal points to, −1 if the other, 0 if it sees none.
 const PARTS: usize = 17;
+const WORLD: usize = 9;
+const NORMAL: usize = 12;
+const LENGTH: usize = 15;
+const TURN: usize = 16;
+
+/// Sixteen faces, or one sixteen times.
+#[derive(Clone, Copy)]
+struct FaceVector<S: Simd> {
+    corners: [Vec3x16<S>; 3],
+    world: Vec3x16<S>,
+    normal: Vec3x16<S>,
+    length: f32x16<S>,
+    turn: f32x16<S>,
+}
+
+impl<S: Simd> FaceVector<S> {
+    /// Whether a receiver lies behind a face as the light's centre sees it, a bit each: `receiver_plane::is_behind`.
+    #[inline(always)]
+    fn is_before(&self, site: &SiteVector<S>) -> u64 {
+        let height = dot(self.normal, sub(site.world, self.world));
+        (-(height * self.turn)).simd_gt(self.length * site.tolerance).to_bitmask()
+    }
+
+    /// Whether the way from a receiver to the light's centre passes between a face's corners, a bit each.
+    #[inline(always)]
+    fn meets_way(&self, site: &SiteVector<S>) -> u64 {
+        let [a, b, c] = self.corners;
+        let (a, b) = (site.locate(sub(a, site.point)), site.locate(sub(b, site.point)));
+        let c = site.locate(sub(c, site.point));
+        let sides = [is_left(cross(a, b)), is_left(cross(b, c)), is_left(cross(c, a))];
+        !(sides[0] ^ sides[1]) & !(sides[0] ^ sides[2])
+    }
+}
 
 /// Faces of a block, component by component.
 #[derive(Debug, Default)]
@@ -68,25 +101,22 @@ impl BlockFaces {
             let parts = corners.vector(vector);
             let (a, b) = (load_three(simd, parts, 0), load_three(simd, parts, 3));
             let c = load_three(simd, parts, 6);
-            let normal = cross(from(b, a), from(c, a));
-            let length = product(normal, normal).sqrt();
+            let normal = cross(sub(b, a), sub(c, a));
+            let length = length(normal);
             let way = match center {
-                LightPoint::At(place) => [place.x - a[0], place.y - a[1], place.z - a[2]],
-                LightPoint::Towards(way) => {
-                    [f32x16::splat(simd, way.x), f32x16::splat(simd, way.y), f32x16::splat(simd, way.z)]
-                }
+                LightPoint::At(place) => sub(splat(simd, place), a),
+                LightPoint::Towards(way) => splat(simd, way),
             };
-            let side = product(normal, way);
+            let side = dot(normal, way);
             let turn = side.simd_gt(0.0).select(one, side.simd_lt(0.0).select(-one, nothing));
             let turn = length.simd_gt(0.0).select(turn, nothing);
-            let origin =
-                [f32x16::splat(simd, origin.x), f32x16::splat(simd, origin.y), f32x16::splat(simd, origin.z)];
-            let three = [from(a, origin), from(b, origin), from(c, origin), a, normal];
+            let origin = splat(simd, origin);
+            let three = [sub(a, origin), sub(b, origin), sub(c, origin), a, normal];
             let into = self.lanes.vector_mut(vector);
-            for part in 0..15 {
-                into[part] = three[part / 3][part % 3].to_array();
+            for (part, numbers) in into.iter_mut().zip(three.as_flattened()) {
+                *part = numbers.to_array();
             }
-            (into[15], into[16]) = (length.to_array(), turn.to_array());
+            (into[LENGTH], into[TURN]) = (length.to_array(), turn.to_array());
         }
     }
 
@@ -95,7 +125,7 @@ impl BlockFaces {
     pub(crate) fn keep_for<S: Simd>(
         &mut self,
         simd: S,
-        receivers: &[(u32, Receiver)],
+        sites: &Sites,
         bounds: &Aabb,
         (light, origin): (&Light, Vec3),
     ) -> Before {
@@ -111,16 +141,8 @@ impl BlockFaces {
             if is_known {
                 (inside, outside) = self.sides(simd, vector, bounds, center);
             }
-            let (mut any, mut all) = (0, u64::MAX);
+            let (any, all) = self.before_any_and_all(simd, vector, sites, inside, valid & !outside);
             let asked = valid & !outside;
-            for (_, receiver) in receivers {
-                let behind = self.behind(simd, vector, receiver);
-                (any, all) = (any | behind, all & behind);
-                // Whether it lies between is known of none, and all before whom it may.
-                if any & asked == asked && all & inside & asked == 0 {
-                    break;
-                }
-            }
             covers |= all & inside & asked != 0;
             kept = self.lanes.keep(vector, any & asked, kept);
         }
@@ -132,48 +154,106 @@ impl BlockFaces {
         }
     }
 
-    /// How many faces lie between a receiver and the light's centre. `site` is the receiver's.
+    /// Which faces of a vector some of the receivers lie behind, and which all of them do, a bit each. Right for those that are `asked` in
+    /// so far as it matters: whether a face lies between is known of none or of all before whom it may, which are `inside`.
     #[inline(always)]
-    pub(crate) fn before<S: Simd>(&self, simd: S, receiver: &Receiver, site: &Site) -> i32 {
-        let mut count = 0;
-        for vector in 0..self.lanes.vectors() {
-            let behind = self.behind(simd, vector, receiver) & self.lanes.valid(vector);
-            if behind == 0 {
-                continue;
+    fn before_any_and_all<S: Simd>(
+        &self,
+        simd: S,
+        vector: usize,
+        sites: &Sites,
+        inside: u64,
+        asked: u64,
+    ) -> (u64, u64) {
+        let (mut any, mut all) = (0, u64::MAX);
+        if by_receivers(sites.len(), self.lanes.len()) {
+            let mut left = asked;
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize % LANES;
+                left &= left - 1;
+                let face = self.one(simd, vector * LANES + lane);
+                for of in 0..sites.vectors() {
+                    let (valid, behind) = (sites.valid(of), face.is_before(&sites.sixteen(simd, of)));
+                    any |= u64::from(behind & valid != 0) << lane;
+                    all &= !(u64::from(behind & valid != valid) << lane);
+                    if (any & !(all & inside)) >> lane & 1 == 1 {
+                        break;
+                    }
+                }
             }
-            let a = site.locate_vector(self.corner(simd, vector, 0, site.point));
-            let b = site.locate_vector(self.corner(simd, vector, 3, site.point));
-            let c = site.locate_vector(self.corner(simd, vector, 6, site.point));
-            let sides = [is_left(cross(a, b)), is_left(cross(b, c)), is_left(cross(c, a))];
-            let meets = !(sides[0] ^ sides[1]) & !(sides[0] ^ sides[2]);
-            count += (behind & meets).count_ones() as i32;
+        } else {
+            let face = self.sixteen(simd, vector);
+            for receiver in 0..sites.len() {
+                let behind = face.is_before(&sites.one(simd, receiver));
+                (any, all) = (any | behind, all & behind);
+                if any & asked == asked && all & inside & asked == 0 {
+                    break;
+                }
+            }
         }
-        count
+        (any, all)
     }
 
+    /// Adds to `counts` how many faces lie between each receiver and the light's centre.
     #[inline(always)]
-    fn part<S: Simd>(&self, simd: S, kind: usize, vector: usize) -> f32x16<S> {
-        f32x16::load_array_ref(simd, &self.lanes.vector(vector)[kind])
+    pub(crate) fn add_before<S: Simd>(&self, simd: S, sites: &Sites, counts: &mut [i32]) {
+        if by_receivers(sites.len(), self.lanes.len()) {
+            for of in 0..sites.vectors() {
+                let (site, valid) = (sites.sixteen(simd, of), sites.valid(of));
+                for index in 0..self.lanes.len() {
+                    let face = self.one(simd, index);
+                    let mut before = face.is_before(&site) & valid;
+                    if before != 0 {
+                        before &= face.meets_way(&site);
+                    }
+                    while before != 0 {
+                        counts[of * LANES + before.trailing_zeros() as usize % LANES] += 1;
+                        before &= before - 1;
+                    }
+                }
+            }
+        } else {
+            for (receiver, count) in counts.iter_mut().enumerate() {
+                let site = sites.one(simd, receiver);
+                for vector in 0..self.lanes.vectors() {
+                    let face = self.sixteen(simd, vector);
+                    let before = face.is_before(&site) & self.lanes.valid(vector);
+                    if before != 0 {
+                        *count += (before & face.meets_way(&site)).count_ones() as i32;
+                    }
+                }
+            }
+        }
     }
 
-    /// Corners whose x has the number `kind`, counted from a point.
+    /// A vector of faces.
     #[inline(always)]
-    fn corner<S: Simd>(&self, simd: S, vector: usize, kind: usize, point: Vec3) -> [f32x16<S>; 3] {
-        let (x, y) = (self.part(simd, kind, vector), self.part(simd, kind + 1, vector));
-        [x - point.x, y - point.y, self.part(simd, kind + 2, vector) - point.z]
+    fn sixteen<S: Simd>(&self, simd: S, vector: usize) -> FaceVector<S> {
+        let parts = self.lanes.vector(vector);
+        FaceVector {
+            corners: [load_three(simd, parts, 0), load_three(simd, parts, 3), load_three(simd, parts, 6)],
+            world: load_three(simd, parts, WORLD),
+            normal: load_three(simd, parts, NORMAL),
+            length: f32x16::load_array_ref(simd, &parts[LENGTH]),
+            turn: f32x16::load_array_ref(simd, &parts[TURN]),
+        }
     }
 
-    /// Faces behind which a receiver lies as the light's centre sees them, a bit each: `receiver_plane::is_behind`.
+    /// One face, sixteen times.
     #[inline(always)]
-    fn behind<S: Simd>(&self, simd: S, vector: usize, receiver: &Receiver) -> u64 {
-        let Receiver { point, tolerance, .. } = *receiver;
-        let x = point.x - self.part(simd, 9, vector);
-        let y = point.y - self.part(simd, 10, vector);
-        let z = point.z - self.part(simd, 11, vector);
-        let (nx, ny) = (self.part(simd, 12, vector), self.part(simd, 13, vector));
-        let height = nx * x + ny * y + self.part(simd, 14, vector) * z;
-        let (length, turn) = (self.part(simd, 15, vector), self.part(simd, 16, vector));
-        (-(height * turn)).simd_gt(length * tolerance).to_bitmask()
+    fn one<S: Simd>(&self, simd: S, index: usize) -> FaceVector<S> {
+        let lanes = &self.lanes;
+        FaceVector {
+            corners: [
+                splat(simd, lanes.three(index, 0)),
+                splat(simd, lanes.three(index, 3)),
+                splat(simd, lanes.three(index, 6)),
+            ],
+            world: splat(simd, lanes.three(index, WORLD)),
+            normal: splat(simd, lanes.three(index, NORMAL)),
+            length: f32x16::splat(simd, lanes.at(index, LENGTH)),
+            turn: f32x16::splat(simd, lanes.at(index, TURN)),
+        }
     }
 
     /// Which faces have all of a box within the planes through their edges and the light's centre, or within those opposite;
@@ -183,14 +263,12 @@ impl BlockFaces {
         let (middle, half) = (bounds.center(), 0.5 * bounds.size());
         let (mut positive, mut negative) = ([0; 3], [0; 3]);
         for side in 0..3 {
-            let a = self.corner(simd, vector, 3 * side, Vec3::ZERO);
-            let b = self.corner(simd, vector, 3 * ((side + 1) % 3), Vec3::ZERO);
-            let along = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
+            let parts = self.lanes.vector(vector);
+            let a: Vec3x16<S> = load_three(simd, parts, 3 * side);
+            let along = sub(load_three(simd, parts, 3 * ((side + 1) % 3)), a);
             let way = match center {
-                LightPoint::At(place) => [place.x - a[0], place.y - a[1], place.z - a[2]],
-                LightPoint::Towards(way) => {
-                    [f32x16::splat(simd, way.x), f32x16::splat(simd, way.y), f32x16::splat(simd, way.z)]
-                }
+                LightPoint::At(place) => sub(splat(simd, place), a),
+                LightPoint::Towards(way) => splat(simd, way),
             };
             let (mut value, mut reach) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0));
             for axis in 0..3 {
@@ -226,14 +304,53 @@ fn is_steep(light: &Light, bounds: &Aabb, origin: Vec3) -> bool {
     normal.dot(way).abs() - normal.abs().dot(reach) > FLATTEST * (way.length() + reach.length())
 }
 
-/// b − a.
-#[inline(always)]
-fn from<S: Simd>(b: [f32x16<S>; 3], a: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
-    [b[0] - a[0], b[1] - a[1], b[2] - a[2]]
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fearless_simd::{Level, dispatch};
+    use gnomon_shadow_map::light_maps::Receiver;
 
-/// a·b, summed as glam does.
-#[inline(always)]
-fn product<S: Simd>(a: [f32x16<S>; 3], b: [f32x16<S>; 3]) -> f32x16<S> {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    use crate::sites::tests::{LIGHT, numbers, receivers};
+
+    /// Receivers that ask together, a face at a time, find what each of them finds alone, sixteen faces at a time.
+    #[test]
+    fn what_lies_before_each_lies_before_it_among_all() {
+        let (mut next, mut before_some) = (numbers(), 0);
+        for round in 0..200 {
+            let receivers: Vec<(u32, Receiver)> = receivers(&mut next, 1 + round % 40);
+            let corners: Vec<[f32; 9]> = (0..1 + round % 23)
+                .map(|_| {
+                    let middle = Vec3::new(next(), next() + 1.0, next());
+                    let corners = [(); 3].map(|()| middle + Vec3::new(next(), next(), next()) * 0.8);
+                    std::array::from_fn(|part| corners[part / 3][part % 3])
+                })
+                .collect();
+            let indices: Vec<u32> = (0..corners.len() as u32).collect();
+            let bounds = Aabb::from_points(receivers.iter().map(|(_, receiver)| receiver.point));
+            let asked_by = |held: &[(u32, Receiver)]| {
+                let (mut sites, mut counts) = (Sites::default(), vec![0; held.len()]);
+                let (mut chosen, mut faces) = (Chosen::default(), BlockFaces::default());
+                sites.place(held, Vec3::ZERO);
+                let kept = dispatch!(Level::new(), simd => {
+                    sites.set_light(simd, &LIGHT);
+                    let corners = |index: u32| corners[index as usize];
+                    chosen.gather(simd, &indices, corners, None, Vec3::ZERO);
+                    faces.gather(simd, &chosen, Vec3::ZERO, LIGHT.center());
+                    faces.add_before(simd, &sites, &mut counts);
+                    faces.keep_for(simd, &sites, &bounds, (&LIGHT, Vec3::ZERO))
+                });
+                (kept, counts)
+            };
+            let (kept, counts) = asked_by(&receivers);
+            let alone: Vec<i32> = receivers.iter().flat_map(|&receiver| asked_by(&[receiver]).1).collect();
+            assert_eq!(counts, alone, "{round}");
+            match kept {
+                Before::None => assert!(counts.iter().all(|&count| count == 0), "{round}"),
+                Before::All => assert!(counts.iter().all(|&count| count > 0), "{round}"),
+                Before::Some => {}
+            }
+            before_some += usize::from(counts.iter().any(|&count| count > 0));
+        }
+        assert!((50..200).contains(&before_some), "{before_some}");
+    }
 }

@@ -6,25 +6,25 @@
 //!
 //! - a block that no edge reaches has no penumbra: with no face before any of its receivers, or one before all, it is answered
 //!   as a whole, or else by faces alone, the hard test;
-//! - of the others each receiver asks the edges and faces that are left, sixteen at a time.
+//! - of the others each receiver asks the edges and faces that are left, sixteen pairs of both at a time ([`sites`](crate::sites)).
 //!
 //! Whatever is left out would not have counted, so that the image is the same without blocks (`skip` off).
 
 use fearless_simd::Simd;
-use glam::Vec3;
-use gnomon_shadow_map::light_cone::LightCone;
+use glam::{Vec2, Vec3};
 use gnomon_shadow_map::light_maps::Receiver;
-use scene_core::Light;
 use scene_core::geometry::Aabb;
 
 use crate::beam::Beam;
 use crate::block_faces::{Before, BlockFaces};
 use crate::chosen::Chosen;
-use crate::coverage::{Counter, Site};
-use crate::cpu::{before_center, by_map, site_of};
+use crate::coverage::Counter;
+use crate::cpu::{before_center, by_map};
 use crate::grid::TileLists;
+use crate::lanes::LANES;
 use crate::outer::{self, Kept};
 use crate::params::Variant;
+use crate::sites::{Sites, by_receivers};
 use crate::tile_edges::TileEdges;
 use crate::{PreparedDdoc, paper};
 
@@ -32,11 +32,11 @@ use crate::{PreparedDdoc, paper};
 pub(crate) const FEW_RECEIVERS: usize = 8;
 
 /// Receivers of a block with edges at most.
-const MOST_RECEIVERS: usize = 64;
+const MOST_RECEIVERS: usize = 128;
 
-/// Edges from which none are chosen: as many as a vector has lanes; and faces.
-const FEW_EDGES: usize = 16;
-const FEW_FACES: usize = 32;
+/// Edges and faces from which none are chosen: sixteen receivers ask about each of them at once.
+const FEW_EDGES: usize = 32;
+const FEW_FACES: usize = 64;
 
 /// What a thread keeps from tile to tile.
 #[derive(Default)]
@@ -46,7 +46,10 @@ pub(crate) struct Thread {
     /// Those that the block at hand is asked about.
     edges: TileEdges,
     faces: BlockFaces,
-    /// The tile's edges by index.
+    /// Its receivers, and how many faces lie before the light's centre for each.
+    sites: Sites,
+    at_center: Vec<i32>,
+    /// The tile's edges or faces by index.
     indices: Vec<u32>,
     /// The tile's receivers, and where their values go.
     receivers: Vec<(u32, Receiver)>,
@@ -55,10 +58,17 @@ pub(crate) struct Thread {
     /// Blocks to come.
     blocks: Vec<Block>,
     counter: Counter,
-    /// Whether the counter's points are those of all receivers.
-    has_points: bool,
     /// Receivers without an edge.
     pub(crate) without_edge: u64,
+}
+
+impl Thread {
+    /// To count at these points of the light.
+    pub(crate) fn new(points: &[Vec2]) -> Self {
+        let mut thread = Self::default();
+        thread.counter.set_points(points);
+        thread
+    }
 }
 
 /// Things of the tile at hand: lists of several tiles may name one more than once.
@@ -125,12 +135,14 @@ pub(crate) fn shade_tile<S: Simd>(
         if thread.edges.is_empty() {
             thread.without_edge += thread.receivers.len() as u64;
         }
-        for index in 0..thread.receivers.len() {
-            let (slot, receiver) = thread.receivers[index];
-            let (site, cone) = site_of(prepared, &receiver);
-            let at_center = before_center(prepared, tile.view, &receiver, &site);
-            values[slot as usize] = tile.answer(simd, &receiver, (&site, cone), at_center, thread);
+        thread.sites.place(&thread.receivers, prepared.origin);
+        thread.sites.set_light(simd, &prepared.base.light);
+        thread.at_center.clear();
+        for (index, (_, receiver)) in thread.receivers.iter().enumerate() {
+            let site = thread.sites.site(index);
+            thread.at_center.push(before_center(prepared, tile.view, receiver, &site));
         }
+        tile.answer(simd, 0..thread.receivers.len(), thread, &mut values);
     }
     values
 }
@@ -171,18 +183,23 @@ fn shade_blocks<S: Simd>(simd: S, tile: &Tile<'_, '_>, thread: &mut Thread, valu
             faces.take_within(simd, faces_below, to_center.as_ref(), origin);
         } else {
             let (seen_edges, seen_faces) = (&mut thread.seen_edges, &mut thread.seen_faces);
+            let indices = &mut thread.indices;
+            indices.clear();
             let new = splats.of_all_within(level, number).filter(|&index| seen_edges.is_new(index));
+            new.for_each(|index| indices.push(index));
             let ends = |index: u32| {
                 let edge = &prepared.edges[index as usize];
                 [edge.a.x, edge.a.y, edge.a.z, edge.b.x, edge.b.y, edge.b.z]
             };
-            edges.gather(simd, new, ends, to_light.as_ref(), Vec3::ZERO);
+            edges.gather(simd, indices, ends, to_light.as_ref(), Vec3::ZERO);
+            indices.clear();
             let new = lists.of_all_within(level, number).filter(|&index| seen_faces.is_new(index));
+            new.for_each(|index| indices.push(index));
             let corners = |index: u32| {
                 let [a, b, c] = scene.corners(index as usize);
                 [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z]
             };
-            faces.gather(simd, new, corners, to_center.as_ref(), origin);
+            faces.gather(simd, indices, corners, to_center.as_ref(), origin);
         }
         let is_small = held.len() <= FEW_RECEIVERS
             || edges.len() <= FEW_EDGES
@@ -192,18 +209,17 @@ fn shade_blocks<S: Simd>(simd: S, tile: &Tile<'_, '_>, thread: &mut Thread, valu
             && of_whole.is_some_and(|whole| costs_more(held.len(), whole, edges.len() + faces.len()));
         // Without a beam no part has less than the whole.
         if !is_small && !is_settled && to_light.is_some() {
-            let (middle, axis) = (held.len() / 2, bounds.size().max_position());
-            held.select_nth_unstable_by(middle, |(_, a), (_, b)| a.point[axis].total_cmp(&b.point[axis]));
-            let middle = receivers.start + middle;
+            let middle = receivers.start + split(held, &bounds, origin);
             thread.blocks.push(Block { receivers: middle..receivers.end, part_of: Some(place) });
             thread.blocks.push(Block { receivers: receivers.start..middle, part_of: Some(place) });
             continue;
         }
         let held = &thread.receivers[receivers.clone()];
+        thread.sites.place(held, origin);
         thread.edges.gather(&prepared.edges, edges.indices().iter().copied());
-        thread.edges.keep_for(simd, held, origin, silhouettes);
+        thread.edges.keep_for(simd, &thread.sites, silhouettes);
         thread.faces.gather(simd, faces, origin, light.center());
-        let before = thread.faces.keep_for(simd, held, &bounds, (light, origin));
+        let before = thread.faces.keep_for(simd, &thread.sites, &bounds, (light, origin));
         if thread.edges.is_empty() {
             thread.without_edge += held.len() as u64;
             // Behind the light's plane nothing is taken to lie before the centre.
@@ -217,18 +233,18 @@ fn shade_blocks<S: Simd>(simd: S, tile: &Tile<'_, '_>, thread: &mut Thread, valu
                 continue;
             }
         }
-        for index in receivers {
-            let (slot, receiver) = thread.receivers[index];
-            let (site, cone) = site_of(prepared, &receiver);
-            let mut at_center = 0;
-            if let Some(place) = layers.image.place(receiver.point) {
-                at_center = thread.faces.before(simd, &receiver, &site);
-                if by_map_too {
-                    at_center += by_map(prepared, view, &receiver, place);
-                }
+        thread.sites.set_light(simd, light);
+        thread.at_center.clear();
+        thread.at_center.resize(held.len(), 0);
+        thread.faces.add_before(simd, &thread.sites, &mut thread.at_center);
+        for (count, (_, receiver)) in thread.at_center.iter_mut().zip(held) {
+            match layers.image.place(receiver.point) {
+                Some(place) if by_map_too => *count += by_map(prepared, view, receiver, place),
+                Some(_) => {}
+                None => *count = 0,
             }
-            values[slot as usize] = tile.answer(simd, &receiver, (&site, cone), at_center, thread);
         }
+        tile.answer(simd, receivers, thread, values);
     }
 }
 
@@ -237,6 +253,21 @@ fn shade_blocks<S: Simd>(simd: S, tile: &Tile<'_, '_>, thread: &mut Thread, valu
 /// were chosen: the smaller blocks are beside the penumbra's width, the less sets them apart.
 fn costs_more(receivers: usize, whole: usize, kept: usize) -> bool {
     receivers * (whole - kept) <= FEW_RECEIVERS * whole
+}
+
+/// Brings the receivers on one side of the middle of their box to the front, and says how many these are; half of all where all lie
+/// on one side.
+fn split(receivers: &mut [(u32, Receiver)], bounds: &Aabb, origin: Vec3) -> usize {
+    let axis = bounds.size().max_position();
+    let middle = bounds.center()[axis] + origin[axis];
+    let mut below = 0;
+    for index in 0..receivers.len() {
+        if receivers[index].1.point[axis] < middle {
+            receivers.swap(index, below);
+            below += 1;
+        }
+    }
+    if below == 0 || below == receivers.len() { receivers.len() / 2 } else { below }
 }
 
 /// The box around receivers, relative to the origin. A difference rounded is the least where the number was.
@@ -250,41 +281,46 @@ fn bounds_of(receivers: &[(u32, Receiver)], origin: Vec3) -> Aabb {
 }
 
 impl Tile<'_, '_> {
-    /// V of a receiver, if `at_center` faces lie between it and the light's centre, from the edges at hand.
+    /// V of the receivers in a range, which are those of `thread.sites`, from what is at hand.
     #[inline(always)]
     fn answer<S: Simd>(
         &self,
         simd: S,
-        receiver: &Receiver,
-        (site, cone): (&Site, Option<LightCone>),
-        at_center: i32,
+        receivers: std::ops::Range<usize>,
         thread: &mut Thread,
-    ) -> f32 {
-        let (prepared, edges) = (self.prepared, &thread.edges);
-        let light = &prepared.base.light;
-        let hard = if at_center > 0 { 0.0 } else { 1.0 };
-        let Some(cone) = cone else { return hard };
-        match prepared.variant {
-            Variant::Ddoc | Variant::ImageEdges => {
-                let most = thread.counter.set_receiver(simd, site, edges);
-                // The count is the same before all points, or above 0 before all.
-                if most == 0.0 || most < at_center as f32 {
-                    return hard;
-                }
-                // Only on a sphere do the points differ from receiver to receiver.
-                if !thread.has_points || matches!(light, Light::Sphere { .. }) {
-                    thread.counter.set_points(prepared.points.iter().map(|&point| cone.share(point)));
-                    thread.has_points = true;
-                }
-                thread.counter.visible(simd, at_center, prepared.points.len())
+        values: &mut [f32],
+    ) {
+        let Thread { sites, edges, at_center, counter, indices, .. } = thread;
+        let (prepared, sites, edges) = (self.prepared, &*sites, &*edges);
+        let counts = matches!(prepared.variant, Variant::Ddoc | Variant::ImageEdges);
+        for (vector, held) in thread.receivers[receivers].chunks(LANES).enumerate() {
+            let together = counts && by_receivers(held.len(), edges.len());
+            if together {
+                counter.set_receivers(simd, sites, vector, edges);
             }
-            Variant::Smoothies => outer::visible(Kept::Nearest, site, edges, hard),
-            Variant::PenumbraMap => outer::visible(Kept::Darkest, site, edges, hard),
-            Variant::Paper => {
-                let edges = thread.indices.iter().map(|&edge| (edge, &prepared.edges[edge as usize]));
-                let (image, points) = (&prepared.layers[self.view].image, &prepared.points);
-                let light = (light, prepared.hull.as_ref());
-                paper::visible(light, image, receiver, prepared.origin, edges, points, hard)
+            for (lane, (slot, receiver)) in held.iter().enumerate() {
+                let index = vector * LANES + lane;
+                let at_center = at_center[index];
+                let hard = if at_center > 0 { 0.0 } else { 1.0 };
+                let height = sites.height(index);
+                let outer = |kept| outer::visible(kept, &sites.site(index), edges, hard);
+                values[*slot as usize] = match (prepared.variant, height) {
+                    (_, None) => hard,
+                    (Variant::Ddoc | Variant::ImageEdges, Some(height)) => {
+                        if !together {
+                            counter.set_receiver(simd, sites, index, edges);
+                        }
+                        counter.visible(simd, if together { lane } else { 0 }, at_center, height)
+                    }
+                    (Variant::Smoothies, _) => outer(Kept::Nearest),
+                    (Variant::PenumbraMap, _) => outer(Kept::Darkest),
+                    (Variant::Paper, _) => {
+                        let edges = indices.iter().map(|&edge| (edge, &prepared.edges[edge as usize]));
+                        let (image, points) = (&prepared.layers[self.view].image, &prepared.points);
+                        let light = (&prepared.base.light, prepared.hull.as_ref());
+                        paper::visible(light, image, receiver, prepared.origin, edges, points, hard)
+                    }
+                };
             }
         }
     }

@@ -67,28 +67,21 @@ impl<const N: usize> Chosen<N> {
     pub(crate) fn gather<S: Simd>(
         &mut self,
         simd: S,
-        mut things: impl Iterator<Item = u32>,
+        things: &[u32],
         corners: impl Fn(u32) -> [f32; N],
         beam: Option<&Beam>,
         origin: Vec3,
     ) {
         self.corners.clear();
         let (mut indices, mut parts) = ([0u32; LANES], [[0.0f32; LANES]; N]);
-        loop {
-            let mut count = 0;
-            while count < LANES
-                && let Some(index) = things.next()
-            {
+        for things in things.chunks(LANES) {
+            for (lane, &index) in things.iter().enumerate() {
                 for (part, value) in parts.iter_mut().zip(corners(index)) {
-                    part[count] = value;
+                    part[lane] = value;
                 }
-                indices[count] = index;
-                count += 1;
+                indices[lane] = index;
             }
-            self.take(inside(simd, beam, &parts, origin) & ((1 << count) - 1), &indices, &parts);
-            if count < LANES {
-                break;
-            }
+            self.take(inside(simd, beam, &parts, origin) & ((1 << things.len()) - 1), &indices, &parts);
         }
     }
 

@@ -1,7 +1,7 @@
 //! Step 4: V of a receiver from the edges around it.
 //!
 //! From the receiver p every edge is projected onto the light, in the coordinates (a, b, t) of
-//! [`LightCone`]: a point of the light is (a/t, b/t). The number of faces before the light's
+//! [`LightCone`](gnomon_shadow_map::light_cone::LightCone): a point of the light is (a/t, b/t). The number of faces before the light's
 //! point s is that before its centre c, and what the edges add that the segment from c to s crosses:
 //!
 //! > n(s) = n(c) + Σ m(e)·o·([s left of e] − [c left of e]),
@@ -18,14 +18,14 @@
 //! Edges count as far as they lie above the receiver's plane (below, they are its own surface, and the light is above) and
 //! before the light. They are cut there.
 
-use fearless_simd::{Simd, SimdBase, SimdMask, f32x16, mask32x16};
+use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x16, mask32x16};
 use glam::{Mat3, Vec2, Vec3};
-use gnomon_shadow_map::light_cone::LightCone;
-use gnomon_shadow_map::light_maps::Receiver;
-use scene_core::light::LightPoint;
 
 use crate::lanes::LANES;
-use crate::tile_edges::{TileEdges, cross, dot};
+use crate::light_cones::share;
+use crate::sites::{SiteVector, Sites};
+use crate::tile_edges::{EdgeVector, TileEdges};
+use crate::vectors::{cross, dot, sub};
 
 /// A receiver, relative to the edges' origin, and the light over it.
 #[derive(Clone, Copy, Debug)]
@@ -37,54 +37,16 @@ pub struct Site {
     /// Distance from its plane below which a point counts as on it.
     pub tolerance: f32,
     /// From a point counted from the receiver to (a, b, t).
-    light_from_receiver: Mat3,
-    /// o.
-    orientation: f32,
+    pub light_from_receiver: Mat3,
     /// Whether nothing lies behind the light.
-    is_parallel: bool,
+    pub is_parallel: bool,
 }
 
 impl Site {
-    /// Of a receiver at `point`.
-    pub fn new(point: Vec3, normal: Vec3, tolerance: f32, cone: &LightCone, is_parallel: bool) -> Self {
-        let right_handed = cone.u.cross(cone.v).dot(cone.w) > 0.0;
-        Self {
-            point,
-            normal,
-            tolerance,
-            light_from_receiver: cone.light_from_receiver(),
-            orientation: if right_handed { -1.0 } else { 1.0 },
-            is_parallel,
-        }
-    }
-
-    /// Under a light without extent, which has no cone: b and a are two directions across the way to its centre, t is along
-    /// it.
-    pub fn without_cone(receiver: &Receiver, origin: Vec3, center: LightPoint) -> Self {
-        let (to_center, _) = center.ray_from(receiver.point);
-        let w = to_center.normalize_or(receiver.normal);
-        let (u, v) = w.any_orthonormal_pair();
-        Self {
-            point: receiver.point - origin,
-            normal: receiver.normal,
-            tolerance: receiver.tolerance,
-            light_from_receiver: Mat3::from_cols(u, v, w).transpose(),
-            orientation: -1.0,
-            is_parallel: true,
-        }
-    }
-
     /// (a, b, t) of a point.
     #[inline]
     pub(crate) fn locate(&self, point: Vec3) -> Vec3 {
         self.light_from_receiver * (point - self.point)
-    }
-
-    /// (a, b, t) of a vector of points, counted from the receiver.
-    #[inline(always)]
-    pub(crate) fn locate_vector<S: Simd>(&self, from_receiver: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
-        let rows = self.light_from_receiver.transpose();
-        [dot(rows.x_axis, from_receiver), dot(rows.y_axis, from_receiver), dot(rows.z_axis, from_receiver)]
     }
 
     /// The part of an edge, in (a, b, t), that lies above the receiver's plane, on the light's side of it and before the
@@ -136,139 +98,241 @@ struct Crossing {
     center_left: bool,
 }
 
+/// The edges that may lie over the light of a receiver.
+#[derive(Debug, Default)]
+struct Over {
+    crossings: Vec<Crossing>,
+    /// How many faces fewer than before the centre there may be at least.
+    fewer: f32,
+}
+
 /// Points of the light and what is counted at them; memory that is kept from receiver to receiver.
 #[derive(Debug, Default)]
-pub struct Counter {
-    /// The points' a and b.
-    xs: Vec<f32>,
-    ys: Vec<f32>,
-    /// The edges that may lie over the light of the receiver at hand.
-    crossings: Vec<Crossing>,
+pub(crate) struct Counter {
+    /// The points as shares of the light, x and y; copies of the last one fill the last vector.
+    shares: [Vec<f32>; 2],
+    taps: usize,
+    /// Where they lie, in a and b, on a light of a height.
+    places: [Vec<f32>; 2],
+    height: Option<f32>,
+    /// Of sixteen receivers, or of one.
+    over: [Over; LANES],
 }
 
 impl Counter {
-    /// Takes the points of the light for the receivers to come.
-    #[inline(always)]
-    pub fn set_points(&mut self, points: impl ExactSizeIterator<Item = Vec2>) {
-        let count = points.len();
-        let padded = count.next_multiple_of(LANES);
-        self.xs.resize(padded, 0.0);
-        self.ys.resize(padded, 0.0);
-        for ((x, y), point) in self.xs.iter_mut().zip(&mut self.ys).zip(points) {
-            (*x, *y) = (point.x, point.y);
-        }
-        if count > 0 {
-            // Copies of the last point: they change no least count.
-            let (x, y) = (self.xs[count - 1], self.ys[count - 1]);
-            self.xs[count..].fill(x);
-            self.ys[count..].fill(y);
+    /// Takes the points of the light, as shares of it.
+    pub(crate) fn set_points(&mut self, points: &[Vec2]) {
+        self.taps = points.len();
+        self.height = None;
+        let padded = self.taps.next_multiple_of(LANES);
+        for (axis, shares) in self.shares.iter_mut().enumerate() {
+            shares.clear();
+            shares.extend(points.iter().map(|point| point[axis]));
+            shares.resize(padded, shares.last().copied().unwrap_or(0.0));
         }
     }
 
-    /// Finds the edges that may lie over the light of a receiver: m(e) ≠ 0, not below its plane, and not beside the square
-    /// around the light (all tests are linear, so they are asked of the ends). Returns by how many faces they may change
-    /// the count at most.
+    /// Finds where the points lie on a light of this height: only of spheres it differs from receiver to receiver.
     #[inline(always)]
-    pub fn set_receiver<S: Simd>(&mut self, simd: S, site: &Site, edges: &TileEdges) -> f32 {
-        self.crossings.clear();
-        let mut most = 0.0;
+    fn set_height<S: Simd>(&mut self, simd: S, height: f32) {
+        if self.height == Some(height) {
+            return;
+        }
+        self.height = Some(height);
+        let ([x, y], [a, b]) = (&self.shares, &mut self.places);
+        a.clear();
+        b.clear();
+        for (x, y) in x.chunks_exact(LANES).zip(y.chunks_exact(LANES)) {
+            let place = share(simd, height, [f32x16::from_slice(simd, x), f32x16::from_slice(simd, y)]);
+            a.extend(place[0].to_array());
+            b.extend(place[1].to_array());
+        }
+    }
+
+    /// Finds the edges that may lie over the light of the receiver `index`, sixteen edges a turn: m(e) ≠ 0, not below its plane, and not
+    /// beside the square around the light (all tests are linear, so they are asked of the ends).
+    #[inline(always)]
+    pub(crate) fn set_receiver<S: Simd>(&mut self, simd: S, sites: &Sites, index: usize, edges: &TileEdges) {
+        let over = &mut self.over[0];
+        over.clear();
+        let site = sites.one(simd, index);
         for vector in 0..edges.vectors() {
-            most += find_crossings(simd, site, edges, vector, &mut self.crossings);
+            let edge = edges.sixteen(simd, vector);
+            let Some(found) = Crossings::of(&site, &edge, edges.valid(vector), sites.is_parallel()) else {
+                continue;
+            };
+            let mut there = found.there;
+            while there != 0 {
+                let lane = there.trailing_zeros() as usize % LANES;
+                there &= there - 1;
+                over.push(found.lane(lane));
+            }
         }
-        most
     }
 
-    /// The share of the first `taps` points before which no face lies, if `at_center` lie before the centre.
+    /// The same of a vector of receivers, sixteen receivers a turn.
+    #[inline(always)]
+    pub(crate) fn set_receivers<S: Simd>(
+        &mut self,
+        simd: S,
+        sites: &Sites,
+        vector: usize,
+        edges: &TileEdges,
+    ) {
+        for over in &mut self.over {
+            over.clear();
+        }
+        let (site, valid) = (sites.sixteen(simd, vector), sites.valid(vector));
+        for index in 0..edges.len() {
+            let edge = edges.one(simd, index);
+            let Some(found) = Crossings::of(&site, &edge, valid, sites.is_parallel()) else { continue };
+            let mut there = found.there;
+            while there != 0 {
+                let lane = there.trailing_zeros() as usize % LANES;
+                there &= there - 1;
+                self.over[lane].push(found.lane(lane));
+            }
+        }
+    }
+
+    /// The share of the points before which no face lies, if `at_center` lie before the centre. `lane` is the receiver's among those that
+    /// were set, and `height` the light's over it.
     ///
     /// Counts below 0 would be a contradiction: `at_center` was found too small, and is raised.
     #[inline(always)]
-    pub fn visible<S: Simd>(&mut self, simd: S, at_center: i32, taps: usize) -> f32 {
-        let raised = at_center as f32;
-        // Without a contradiction −at_center is the count of clear points; with one the least count is.
-        let (mut least, mut of_least, mut clear) = (0.0f32, 0u32, 0u32);
-        for first in (0..taps).step_by(LANES) {
-            let counts = self.count(simd, first);
-            let valid = (1u64 << (taps - first).min(LANES)) - 1;
-            let found = counts.reduce_min();
-            if found < least {
-                (least, of_least) = (found, 0);
-            }
-            of_least += (counts.simd_eq(least).to_bitmask() & valid).count_ones();
-            clear += (counts.simd_eq(-raised).to_bitmask() & valid).count_ones();
+    pub(crate) fn visible<S: Simd>(&mut self, simd: S, lane: usize, at_center: i32, height: f32) -> f32 {
+        let (Over { crossings, fewer }, raised) = (&self.over[lane], at_center as f32);
+        if crossings.is_empty() {
+            return if at_center > 0 { 0.0 } else { 1.0 };
         }
-        let seen = if -least > raised { of_least } else { clear };
-        seen as f32 / taps as f32
+        if *fewer < raised {
+            return 0.0;
+        }
+        self.set_height(simd, height);
+        let (crossings, places) = (&self.over[lane].crossings, &self.places);
+        let mut least = f32x16::splat(simd, 0.0);
+        let mut clear = 0;
+        for first in (0..self.taps).step_by(LANES) {
+            let counts = count(simd, crossings, places, first);
+            least = least.min(counts);
+            clear += self.equal(counts, -raised, first);
+        }
+        // Without a contradiction −at_center is the count of clear points; with one the least count is.
+        let least = least.reduce_min();
+        if -least > raised {
+            clear = 0;
+            for first in (0..self.taps).step_by(LANES) {
+                clear += self.equal(count(simd, crossings, places, first), least, first);
+            }
+        }
+        clear as f32 / self.taps as f32
     }
 
-    /// n(s) − n(c) of a vector of points.
+    /// How many points from `first` on have this count. Copies have none.
     #[inline(always)]
-    fn count<S: Simd>(&self, simd: S, first: usize) -> f32x16<S> {
-        let x = f32x16::from_slice(simd, &self.xs[first..first + LANES]);
-        let y = f32x16::from_slice(simd, &self.ys[first..first + LANES]);
-        let (nothing, mut counts) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0));
-        for &Crossing { ends: [a, b], line, step, center_left } in &self.crossings {
-            let sides = (x * a[1] - y * a[0]).simd_lt(0.0) ^ (x * b[1] - y * b[0]).simd_lt(0.0);
-            let left = (x * line[0] + y * line[1] + line[2]).simd_gt(0.0);
-            let crossed = sides & (left ^ mask32x16::splat(simd, center_left));
-            counts += fearless_simd::Select::select(crossed, f32x16::splat(simd, step), nothing);
-        }
-        counts
+    fn equal<S: Simd>(&self, counts: f32x16<S>, count: f32, first: usize) -> u32 {
+        let valid = (1 << (self.taps - first).min(LANES)) - 1;
+        (counts.simd_eq(count).to_bitmask() & valid).count_ones()
     }
 }
 
-/// [`Counter::set_receiver`] of one vector of edges; cuts them as [`Site::cut`] does.
-///
-/// Sums are in the order of [`Site::locate`] and [`center_is_left`], of which faces ask the same.
+/// n(s) − n(c) of a vector of points.
 #[inline(always)]
-fn find_crossings<S: Simd>(
-    simd: S,
-    site: &Site,
-    edges: &TileEdges,
-    vector: usize,
-    found: &mut Vec<Crossing>,
-) -> f32 {
-    let Site { point, normal, tolerance, orientation, is_parallel, .. } = *site;
-    let (from, to) = (edges.from(simd, vector, 0, point), edges.from(simd, vector, 3, point));
-    let heights = [dot(normal, from) - tolerance, dot(normal, to) - tolerance];
-    let (mut a, mut b) = (site.locate_vector(from), site.locate_vector(to));
-    let multiplicity = edges.multiplicity(simd, vector, point);
-    let dead = beside([a[0], a[2]], [b[0], b[2]])
-        | beside([a[1], a[2]], [b[1], b[2]])
-        | multiplicity.simd_eq(0.0).to_bitmask();
-    let mut there = !dead & edges.valid(vector);
-    if edges.has_far() {
-        let far = edges.from(simd, vector, 16, point);
-        // NaN does not rise.
-        there &= !dot(normal, far).simd_gt(tolerance).to_bitmask();
+fn count<S: Simd>(simd: S, crossings: &[Crossing], [x, y]: &[Vec<f32>; 2], first: usize) -> f32x16<S> {
+    let x = f32x16::from_slice(simd, &x[first..first + LANES]);
+    let y = f32x16::from_slice(simd, &y[first..first + LANES]);
+    let (nothing, mut counts) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0));
+    for &Crossing { ends: [a, b], line, step, center_left } in crossings {
+        let sides = (x * a[1] - y * a[0]).simd_lt(0.0) ^ (x * b[1] - y * b[0]).simd_lt(0.0);
+        let left = (x * line[0] + y * line[1] + line[2]).simd_gt(0.0);
+        let crossed = sides & (left ^ mask32x16::splat(simd, center_left));
+        counts += crossed.select(f32x16::splat(simd, step), nothing);
     }
-    if there == 0 {
-        return 0.0;
+    counts
+}
+
+impl Over {
+    fn clear(&mut self) {
+        self.crossings.clear();
+        self.fewer = 0.0;
     }
-    let [x, y, z] = cross(a, b);
-    let center_left = is_left([x, y, z]);
-    there &= keep(heights, &mut a, &mut b);
-    there &= keep([a[2], b[2]], &mut a, &mut b);
-    if !is_parallel {
-        there &= keep([1.0 - a[2], 1.0 - b[2]], &mut a, &mut b);
+
+    #[inline(always)]
+    fn push(&mut self, crossing: Crossing) {
+        self.fewer += (-crossing.step).max(0.0);
+        self.crossings.push(crossing);
     }
-    if there == 0 {
-        return 0.0;
+}
+
+/// Edges that may lie over lights, of sixteen pairs of an edge and a receiver.
+struct Crossings {
+    /// Which pairs, a bit each.
+    there: u64,
+    /// a and b of both ends.
+    ends: [[[f32; LANES]; 2]; 2],
+    line: [[f32; LANES]; 3],
+    step: [f32; LANES],
+    center_left: u64,
+}
+
+impl Crossings {
+    /// Cuts edges as [`Site::cut`] does. `None` if none of the `valid` pairs is one.
+    ///
+    /// Sums are in the order of [`Site::locate`] and [`center_is_left`], of which faces ask the same.
+    #[inline(always)]
+    fn of<S: Simd>(
+        site: &SiteVector<S>,
+        edge: &EdgeVector<S>,
+        valid: u64,
+        is_parallel: bool,
+    ) -> Option<Self> {
+        let (from, to) = (sub(edge.a, site.point), sub(edge.b, site.point));
+        let heights = [dot(site.normal, from) - site.tolerance, dot(site.normal, to) - site.tolerance];
+        let (mut a, mut b) = (site.locate(from), site.locate(to));
+        let multiplicity = edge.multiplicity(site.point);
+        let dead = beside([a[0], a[2]], [b[0], b[2]])
+            | beside([a[1], a[2]], [b[1], b[2]])
+            | multiplicity.simd_eq(0.0).to_bitmask();
+        let mut there = !dead & valid;
+        if let Some(far) = edge.far {
+            // NaN does not rise.
+            there &= !dot(site.normal, sub(far, site.point)).simd_gt(site.tolerance).to_bitmask();
+        }
+        if there == 0 {
+            return None;
+        }
+        let center_left = is_left(cross(a, b));
+        there &= keep(heights, &mut a, &mut b);
+        there &= keep([a[2], b[2]], &mut a, &mut b);
+        if !is_parallel {
+            there &= keep([1.0 - a[2], 1.0 - b[2]], &mut a, &mut b);
+        }
+        if there == 0 {
+            return None;
+        }
+        let [x, y, z] = cross(a, b);
+        // −1 where the centre lies left of it.
+        let step = multiplicity * site.orientation;
+        Some(Self {
+            there,
+            ends: [[a[0].to_array(), a[1].to_array()], [b[0].to_array(), b[1].to_array()]],
+            line: [x.to_array(), y.to_array(), z.to_array()],
+            step: step.to_array(),
+            center_left,
+        })
     }
-    let [x, y, z] = cross(a, b);
-    let line = [x.to_array(), y.to_array(), z.to_array()];
-    let (a, b) = ([a[0].to_array(), a[1].to_array()], [b[0].to_array(), b[1].to_array()]);
-    let multiplicity = multiplicity.to_array();
-    let mut most = 0.0;
-    while there != 0 {
-        let lane = there.trailing_zeros() as usize % LANES;
-        there &= there - 1;
-        let center_left = center_left >> lane & 1 == 1;
-        let step = multiplicity[lane] * orientation * if center_left { -1.0 } else { 1.0 };
-        most += step.abs();
-        let ends = [[a[0][lane], a[1][lane]], [b[0][lane], b[1][lane]]];
-        found.push(Crossing { ends, line: line.map(|line| line[lane]), step, center_left });
+
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> Crossing {
+        let (Self { ends: [a, b], line: [x, y, z], step, .. }, center_left) =
+            (self, self.center_left >> lane & 1 == 1);
+        Crossing {
+            ends: [[a[0][lane], a[1][lane]], [b[0][lane], b[1][lane]]],
+            line: [x[lane], y[lane], z[lane]],
+            step: if center_left { -step[lane] } else { step[lane] },
+            center_left,
+        }
     }
-    most
 }
 
 /// Whether edges lie beyond t on one side of the square, given one coordinate and t of both ends; a bit each.
@@ -299,8 +363,8 @@ fn keep<S: Simd>(by: [f32x16<S>; 2], a: &mut [f32x16<S>; 3], b: &mut [f32x16<S>;
         let share = by[0] / (by[0] - by[1]);
         for (a, b) in a.iter_mut().zip(b) {
             let cut = *a + (*b - *a) * share;
-            *a = fearless_simd::Select::select(below[0], cut, *a);
-            *b = fearless_simd::Select::select(below[1], cut, *b);
+            *a = below[0].select(cut, *a);
+            *b = below[1].select(cut, *b);
         }
     }
     !(below[0] & below[1]).to_bitmask()
@@ -312,6 +376,7 @@ mod tests {
     use crate::silhouettes::Edge;
     use fearless_simd::{Level, dispatch};
     use glam::Vec4;
+    use gnomon_shadow_map::light_maps::Receiver;
     use scene_core::Light;
 
     const LIGHT: Light = Light::Rect { center: Vec3::new(0.0, 4.0, 0.0), half_u: Vec3::X, half_v: Vec3::Z };
@@ -326,19 +391,24 @@ mod tests {
         Edge { a, b, planes, signs: [1.0, 0.0], from_center: 0, far: Vec3::NAN }
     }
 
+    /// By a receiver and sixteen edges at once, and by an edge and sixteen receivers.
     fn visible(point: Vec3, edges: &[Edge], at_center: i32) -> f32 {
-        let cone = LightCone::new(&LIGHT, point).unwrap();
-        let site = Site::new(point, Vec3::Y, 1e-6, &cone, false);
-        let mut tile = TileEdges::default();
+        let receiver = Receiver { point, normal: Vec3::Y, object: 0, tolerance: 1e-6, pixel: [0; 2] };
+        let (mut tile, mut sites, mut counter) = (TileEdges::default(), Sites::default(), Counter::default());
         edges.iter().for_each(|edge| tile.push(edge));
-        let mut counter = Counter::default();
         // Half a step inside, so that no point lies on an edge.
         let grid = |i: u32| Vec2::new((i % 32) as f32, (i / 32) as f32) / 16.0 + (1.0 / 32.0 - 1.0);
-        counter.set_points((0..1024).map(grid));
-        dispatch!(Level::new(), simd => {
-            counter.set_receiver(simd, &site, &tile);
-            counter.visible(simd, at_center, 1024)
-        })
+        counter.set_points(&(0..1024).map(grid).collect::<Vec<_>>());
+        let found = dispatch!(Level::new(), simd => {
+            sites.place(&[(0, receiver); 20], Vec3::ZERO);
+            sites.set_light(simd, &LIGHT);
+            counter.set_receiver(simd, &sites, 17, &tile);
+            let one = counter.visible(simd, 0, at_center, 0.0);
+            counter.set_receivers(simd, &sites, 1, &tile);
+            [one, counter.visible(simd, 3, at_center, 0.0)]
+        });
+        assert_eq!(found[0], found[1]);
+        found[0]
     }
 
     /// The receiver at x under a half-plane that ends at 0: the line through the edge meets the light at −3x, so that the

@@ -4,11 +4,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use fearless_simd::{Level, dispatch};
 use glam::Vec2;
-use gnomon_shadow_map::light_cone::LightCone;
 use gnomon_shadow_map::light_maps::Receiver;
 use rayon::prelude::*;
 use scene_core::raster::{DepthOptions, Fragments, RasterScratch, render_fragments};
-use scene_core::{Light, Report, Scene};
+use scene_core::{Report, Scene};
 
 use crate::PreparedDdoc;
 use crate::blocks::{FEW_RECEIVERS, Thread, Tile, shade_tile};
@@ -111,14 +110,17 @@ fn penumbra(
     let without_edge = AtomicU64::new(0);
     let parts: Vec<Vec<f32>> = ranges
         .par_iter()
-        .map_init(Thread::default, |thread, tile| {
-            let receivers = &sorted[tile.range.clone()];
-            let TileReceivers { view, level, tile, .. } = *tile;
-            let tile = Tile { prepared, view, splats: &maps[view], level, tile };
-            let values = dispatch!(simd_level, simd => shade_tile(simd, &tile, receivers, thread, site));
-            without_edge.fetch_add(std::mem::take(&mut thread.without_edge), Ordering::Relaxed);
-            values
-        })
+        .map_init(
+            || Thread::new(&prepared.points),
+            |thread, tile| {
+                let receivers = &sorted[tile.range.clone()];
+                let TileReceivers { view, level, tile, .. } = *tile;
+                let tile = Tile { prepared, view, splats: &maps[view], level, tile };
+                let values = dispatch!(simd_level, simd => shade_tile(simd, &tile, receivers, thread, site));
+                without_edge.fetch_add(std::mem::take(&mut thread.without_edge), Ordering::Relaxed);
+                values
+            },
+        )
         .collect();
     for (&index, v) in sorted.iter().zip(parts.iter().flatten()) {
         values[index as usize] = *v;
@@ -126,17 +128,6 @@ fn penumbra(
     if prepared.skip {
         report.skip("receivers without a splat", without_edge.into_inner());
     }
-}
-
-/// A receiver as edges and faces see it, and its cone of lines to the light.
-pub(crate) fn site_of(prepared: &PreparedDdoc<'_>, receiver: &Receiver) -> (Site, Option<LightCone>) {
-    let (light, origin) = (&prepared.base.light, prepared.origin);
-    let Some(cone) = LightCone::new(light, receiver.point) else {
-        return (Site::without_cone(receiver, origin, light.center()), None);
-    };
-    let is_parallel = matches!(light, Light::Directional { .. });
-    let point = receiver.point - origin;
-    (Site::new(point, receiver.normal, receiver.tolerance, &cone, is_parallel), Some(cone))
 }
 
 /// How many faces lie between a receiver and the light's centre: the solid ones, those of masks, or what the map shows.

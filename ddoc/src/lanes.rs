@@ -2,6 +2,9 @@
 //! on, so that what is asked of them together lies together.
 
 use fearless_simd::{Simd, SimdBase, f32x16};
+use glam::Vec3;
+
+use crate::vectors::Vec3x16;
 
 /// Lanes of a vector.
 pub(crate) const LANES: usize = 16;
@@ -80,6 +83,12 @@ impl<const N: usize> Lanes<N> {
         self.vectors[thing / LANES][part][thing % LANES]
     }
 
+    /// Three numbers of one thing from `part` on.
+    #[inline(always)]
+    pub(crate) fn three(&self, thing: usize, part: usize) -> Vec3 {
+        Vec3::new(self.at(thing, part), self.at(thing, part + 1), self.at(thing, part + 2))
+    }
+
     /// Moves the lanes that `bits` name, of a vector, down to where `kept` things are already, and says how many are kept then.
     #[inline(always)]
     pub(crate) fn keep(&mut self, vector: usize, mut bits: u64, mut kept: usize) -> usize {
@@ -105,7 +114,7 @@ pub(crate) fn load_three<S: Simd, const N: usize>(
     simd: S,
     vector: &[[f32; LANES]; N],
     part: usize,
-) -> [f32x16<S>; 3] {
+) -> Vec3x16<S> {
     // Spelled out: a closure would be a call of its own.
     let (x, y) =
         (f32x16::load_array_ref(simd, &vector[part]), f32x16::load_array_ref(simd, &vector[part + 1]));

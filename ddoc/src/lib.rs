@@ -16,6 +16,7 @@ pub mod grid;
 pub mod image_edges;
 mod lanes;
 pub mod layers;
+mod light_cones;
 pub mod light_image;
 mod light_points;
 pub mod mask_edges;
@@ -23,10 +24,12 @@ pub mod outer;
 pub mod paper;
 mod params;
 pub mod silhouettes;
+mod sites;
 pub mod splat;
 mod technique;
 pub mod tile_edges;
 pub mod tiles;
+mod vectors;
 
 use std::collections::HashSet;
 

@@ -1,14 +1,58 @@
 //! The edges that a block's receivers are asked about, component by component.
 
-use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
+use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x16};
 use glam::Vec3;
-use gnomon_shadow_map::light_maps::Receiver;
 
-use crate::lanes::{Lanes, load_three};
+use crate::lanes::{LANES, Lanes, load_three};
 use crate::silhouettes::Edge;
+use crate::sites::{SiteVector, Sites, by_receivers};
+use crate::vectors::{Vec3x16, dot, splat, sub};
 
 /// Numbers an edge: a, b, the two planes, the two signs; the point seen past the edge.
 const PARTS: usize = 19;
+
+/// Where the parts of an edge begin.
+const PLANES: [usize; 2] = [6, 10];
+const SIGNS: usize = 14;
+const FAR: usize = 16;
+
+/// Sixteen edges, or one sixteen times.
+#[derive(Clone, Copy)]
+pub(crate) struct EdgeVector<S: Simd> {
+    /// The ends.
+    pub(crate) a: Vec3x16<S>,
+    pub(crate) b: Vec3x16<S>,
+    /// Normals and distances of the two faces' planes.
+    planes: [(Vec3x16<S>, f32x16<S>); 2],
+    signs: [f32x16<S>; 2],
+    /// The point seen past the edge, NaN where it is not known, if it is of some.
+    pub(crate) far: Option<Vec3x16<S>>,
+}
+
+impl<S: Simd> EdgeVector<S> {
+    /// m(e) as seen from a point.
+    #[inline(always)]
+    pub(crate) fn multiplicity(&self, point: Vec3x16<S>) -> f32x16<S> {
+        self.side(0, point) + self.side(1, point)
+    }
+
+    /// sign(e, f)·side(f, p) of the first or second face.
+    #[inline(always)]
+    fn side(&self, face: usize, point: Vec3x16<S>) -> f32x16<S> {
+        let ((normal, d), sign) = (self.planes[face], self.signs[face]);
+        (dot(normal, point) + d).simd_ge(0.0).select(sign, -sign)
+    }
+
+    /// Whether an edge may count for a receiver, a bit each: it rises above its plane and, where it is `silhouettes` that count, is
+    /// one as it sees it.
+    #[inline(always)]
+    fn may_count(&self, site: &SiteVector<S>, silhouettes: bool) -> u64 {
+        let a = dot(site.normal, sub(self.a, site.point)) - site.tolerance;
+        let b = dot(site.normal, sub(self.b, site.point)) - site.tolerance;
+        let bits = !(a.simd_le(0.0) & b.simd_le(0.0)).to_bitmask();
+        if silhouettes { bits & !self.multiplicity(site.point).simd_eq(0.0).to_bitmask() } else { bits }
+    }
+}
 
 /// Edges of a block, component by component.
 #[derive(Debug, Default)]
@@ -44,34 +88,32 @@ impl TileEdges {
         indices.for_each(|index| self.push(&edges[index as usize]));
     }
 
-    /// Keeps the edges that may count for some of the receivers: those that rise above its plane and, where it is `silhouettes`
-    /// that count, are one as it sees them. Each is asked as [`Counter`](crate::coverage::Counter) asks: what is left out
+    /// Keeps the edges that may count for some of the receivers. Each is asked as [`Counter`](crate::coverage) asks: what is left out
     /// would have counted for nobody.
     #[inline(always)]
-    pub(crate) fn keep_for<S: Simd>(
-        &mut self,
-        simd: S,
-        receivers: &[(u32, Receiver)],
-        origin: Vec3,
-        silhouettes: bool,
-    ) {
+    pub(crate) fn keep_for<S: Simd>(&mut self, simd: S, sites: &Sites, silhouettes: bool) {
+        let by_receivers = by_receivers(sites.len(), self.len());
         let mut kept = 0;
         for vector in 0..self.lanes.vectors() {
             let valid = self.lanes.valid(vector);
             let mut counts = 0;
-            for (_, receiver) in receivers {
-                let point = receiver.point - origin;
-                let from = self.from(simd, vector, 0, point);
-                let to = self.from(simd, vector, 3, point);
-                let a = dot(receiver.normal, from) - receiver.tolerance;
-                let b = dot(receiver.normal, to) - receiver.tolerance;
-                let mut bits = !(a.simd_le(0.0) & b.simd_le(0.0)).to_bitmask();
-                if silhouettes {
-                    bits &= !self.multiplicity(simd, vector, point).simd_eq(0.0).to_bitmask();
+            if by_receivers {
+                for lane in 0..valid.count_ones() as usize {
+                    let edge = self.one(simd, vector * LANES + lane);
+                    for of in 0..sites.vectors() {
+                        if edge.may_count(&sites.sixteen(simd, of), silhouettes) & sites.valid(of) != 0 {
+                            counts |= 1 << lane;
+                            break;
+                        }
+                    }
                 }
-                counts |= bits;
-                if counts & valid == valid {
-                    break;
+            } else {
+                let edge = self.sixteen(simd, vector);
+                for receiver in 0..sites.len() {
+                    counts |= edge.may_count(&sites.one(simd, receiver), silhouettes);
+                    if counts & valid == valid {
+                        break;
+                    }
                 }
             }
             kept = self.lanes.keep(vector, counts & valid, kept);
@@ -79,35 +121,49 @@ impl TileEdges {
         self.lanes.resize(kept);
     }
 
-    /// Corners of a vector of edges, whose x has the number `kind`, counted from a point.
+    /// A vector of edges.
     #[inline(always)]
-    pub(crate) fn from<S: Simd>(&self, simd: S, vector: usize, kind: usize, point: Vec3) -> [f32x16<S>; 3] {
-        let [x, y, z] = load_three(simd, self.lanes.vector(vector), kind);
-        [x - point.x, y - point.y, z - point.z]
-    }
-
-    /// m(e) of a vector of edges as seen from a point.
-    #[inline(always)]
-    pub(crate) fn multiplicity<S: Simd>(&self, simd: S, vector: usize, point: Vec3) -> f32x16<S> {
-        self.side(simd, vector, 6, 14, point) + self.side(simd, vector, 10, 15, point)
-    }
-
-    /// sign(e, f)·side(f, p) of the faces whose planes begin at `plane`, and whose signs are `sign`.
-    #[inline(always)]
-    fn side<S: Simd>(&self, simd: S, vector: usize, plane: usize, sign: usize, point: Vec3) -> f32x16<S> {
+    pub(crate) fn sixteen<S: Simd>(&self, simd: S, vector: usize) -> EdgeVector<S> {
         let parts = self.lanes.vector(vector);
-        let [x, y, z] = load_three(simd, parts, plane);
-        let d = f32x16::load_array_ref(simd, &parts[plane + 3]);
-        let at = x * point.x + y * point.y + z * point.z + d;
-        let sign = f32x16::load_array_ref(simd, &parts[sign]);
-        fearless_simd::Select::select(at.simd_ge(0.0), sign, -sign)
+        let (first, second) = (&parts[PLANES[0] + 3], &parts[PLANES[1] + 3]);
+        EdgeVector {
+            a: load_three(simd, parts, 0),
+            b: load_three(simd, parts, 3),
+            planes: [
+                (load_three(simd, parts, PLANES[0]), f32x16::load_array_ref(simd, first)),
+                (load_three(simd, parts, PLANES[1]), f32x16::load_array_ref(simd, second)),
+            ],
+            signs: [
+                f32x16::load_array_ref(simd, &parts[SIGNS]),
+                f32x16::load_array_ref(simd, &parts[SIGNS + 1]),
+            ],
+            far: if self.has_far { Some(load_three(simd, parts, FAR)) } else { None },
+        }
+    }
+
+    /// One edge, sixteen times.
+    #[inline(always)]
+    pub(crate) fn one<S: Simd>(&self, simd: S, index: usize) -> EdgeVector<S> {
+        let (first, second) = (self.lanes.at(index, PLANES[0] + 3), self.lanes.at(index, PLANES[1] + 3));
+        EdgeVector {
+            a: splat(simd, self.lanes.three(index, 0)),
+            b: splat(simd, self.lanes.three(index, 3)),
+            planes: [
+                (splat(simd, self.lanes.three(index, PLANES[0])), f32x16::splat(simd, first)),
+                (splat(simd, self.lanes.three(index, PLANES[1])), f32x16::splat(simd, second)),
+            ],
+            signs: [
+                f32x16::splat(simd, self.lanes.at(index, SIGNS)),
+                f32x16::splat(simd, self.lanes.at(index, SIGNS + 1)),
+            ],
+            far: if self.has_far { Some(splat(simd, self.lanes.three(index, FAR))) } else { None },
+        }
     }
 
     /// The ends of an edge.
     #[inline]
     pub(crate) fn ends(&self, index: usize) -> [Vec3; 2] {
-        let at = |part: usize| self.lanes.at(index, part);
-        [Vec3::new(at(0), at(1), at(2)), Vec3::new(at(3), at(4), at(5))]
+        [self.lanes.three(index, 0), self.lanes.three(index, 3)]
     }
 
     /// Vectors that there are.
@@ -122,12 +178,6 @@ impl TileEdges {
         self.lanes.valid(vector)
     }
 
-    /// Whether of some a point seen past them is known.
-    #[inline(always)]
-    pub(crate) fn has_far(&self) -> bool {
-        self.has_far
-    }
-
     /// Edges there are.
     #[inline(always)]
     pub fn len(&self) -> usize {
@@ -140,14 +190,46 @@ impl TileEdges {
     }
 }
 
-/// The product of an axis with a vector of vectors, summed as glam does.
-#[inline(always)]
-pub(crate) fn dot<S: Simd>(axis: Vec3, v: [f32x16<S>; 3]) -> f32x16<S> {
-    v[0] * axis.x + v[1] * axis.y + v[2] * axis.z
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fearless_simd::{Level, dispatch};
+    use glam::Vec4;
+    use gnomon_shadow_map::light_maps::Receiver;
 
-/// a × b, summed as glam does.
-#[inline(always)]
-pub(crate) fn cross<S: Simd>(a: [f32x16<S>; 3], b: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
-    [a[1] * b[2] - b[1] * a[2], a[2] * b[0] - b[2] * a[0], a[0] * b[1] - b[0] * a[1]]
+    use crate::sites::tests::{numbers, receivers};
+
+    /// Receivers that ask together, an edge at a time, keep what each of them keeps alone, sixteen edges at a time.
+    #[test]
+    fn what_counts_for_some_counts_for_all_together() {
+        let (mut next, mut kept_some) = (numbers(), 0);
+        for round in 0..200 {
+            let receivers: Vec<(u32, Receiver)> = receivers(&mut next, 1 + round % 40);
+            let edges: Vec<Edge> = (0..1 + round % 23)
+                .map(|_| Edge {
+                    a: Vec3::new(next(), next() - 0.3, next()),
+                    b: Vec3::new(next(), next() - 0.3, next()),
+                    planes: [Vec4::new(next(), next(), next(), next()), Vec4::ZERO],
+                    signs: [1.0, (round % 2) as f32],
+                    from_center: 0,
+                    far: Vec3::NAN,
+                })
+                .collect();
+            let kept_for = |held: &[(u32, Receiver)]| {
+                let (mut tile, mut sites) = (TileEdges::default(), Sites::default());
+                edges.iter().for_each(|edge| tile.push(edge));
+                sites.place(held, Vec3::ZERO);
+                dispatch!(Level::new(), simd => tile.keep_for(simd, &sites, true));
+                (0..tile.len()).map(|index| tile.ends(index)).collect::<Vec<_>>()
+            };
+            let together = kept_for(&receivers);
+            let alone: Vec<_> = receivers.iter().map(|&receiver| kept_for(&[receiver])).collect();
+            let expected = edges.iter().map(|edge| [edge.a, edge.b]);
+            let expected: Vec<_> =
+                expected.filter(|ends| alone.iter().any(|kept| kept.contains(ends))).collect();
+            assert_eq!(together, expected, "{round}");
+            kept_some += usize::from((1..edges.len()).contains(&together.len()));
+        }
+        assert!(kept_some > 50, "{kept_some}");
+    }
 }

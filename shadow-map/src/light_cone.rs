@@ -21,49 +21,23 @@ pub struct LightCone {
     pub w: Vec3,
     /// Whether the light is round.
     pub is_round: bool,
-    /// 1 − cos of the angular radius where V is a share of solid angle; 0 where it is one of area.
     height: f32,
     receiver: Vec3,
     light_from_world: Mat3,
 }
 
 impl LightCone {
+    /// Below this volume of unit axes they lie in one plane within the rounding of positions: the light is seen edge-on.
+    pub const FLATTEST: f32 = 1.0 / 1_048_576.0;
+
     /// The cone from `receiver`; `None` for a light without extent, a receiver within a sphere, and where the cone is
     /// so flat that it has no inside.
     pub fn new(light: &Light, receiver: Vec3) -> Option<Self> {
-        let (u, v, w, is_round, height) = match *light {
-            Light::Point { .. } | Light::Spot { .. } => return None,
-            Light::Directional { direction, angular_radius } => {
-                let w = (-direction).try_normalize()?;
-                let (u, v) = w.any_orthonormal_pair();
-                // A cone of a right angle or more has no circle: what is left out lies at the horizon.
-                let radius = angular_radius.min(1.5).tan();
-                (u * radius, v * radius, w, true, one_less_cos(angular_radius))
-            }
-            Light::Sphere { center, radius } => {
-                let w = center - receiver;
-                let distance = w.length();
-                if distance <= radius {
-                    return None;
-                }
-                let (u, v) = (w / distance).any_orthonormal_pair();
-                let sine = radius / distance;
-                let cosine = ((1.0 - sine) * (1.0 + sine)).sqrt();
-                let height = sine * sine / (1.0 + cosine);
-                let radius = sine / cosine * distance;
-                (u * radius, v * radius, w, true, height)
-            }
-            Light::Rect { center, half_u, half_v } => (half_u, half_v, center - receiver, false, 0.0),
-            Light::Disk { center, normal, radius } => {
-                let (u, v) = normal.try_normalize()?.any_orthonormal_pair();
-                (u * radius, v * radius, center - receiver, true, 0.0)
-            }
-        };
+        let LightAxes { u, v, w, is_round, height } = LightAxes::new(light, receiver)?;
         // By rows of the inverse; lengths may be of any size, so the product of three is not taken.
         let unit = [u, v, w].map(|axis| axis.normalize_or_zero());
         let volume = unit[0].cross(unit[1]).dot(unit[2]);
-        // Below 2⁻²⁰ the axes lie in one plane within the rounding of positions: the light is seen edge-on.
-        if volume.is_nan() || volume.abs() < 1.0 / 1_048_576.0 {
+        if volume.is_nan() || volume.abs() < Self::FLATTEST {
             return None;
         }
         let row = |a: Vec3, b: Vec3, length: f32| a.cross(b) / volume / length;
@@ -74,6 +48,12 @@ impl LightCone {
         );
         let light_from_world = rows.transpose();
         light_from_world.is_finite().then_some(Self { u, v, w, is_round, height, receiver, light_from_world })
+    }
+
+    /// 1 − cos of the angular radius where V is a share of solid angle; 0 where it is one of area.
+    #[inline]
+    pub fn height(&self) -> f32 {
+        self.height
     }
 
     /// (a, b, t) of a point in world space.
@@ -126,6 +106,56 @@ impl LightCone {
     #[inline]
     pub fn direction(&self, point: Vec2) -> Vec3 {
         self.w + self.u * point.x + self.v * point.y
+    }
+}
+
+/// A light's half axes as a receiver sees them, and the way to its centre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightAxes {
+    /// Half axis.
+    pub u: Vec3,
+    /// The other half axis.
+    pub v: Vec3,
+    /// From the receiver to the light's centre.
+    pub w: Vec3,
+    /// Whether the light is round.
+    pub is_round: bool,
+    /// [`LightCone::height`].
+    pub height: f32,
+}
+
+impl LightAxes {
+    /// The axes as seen from `receiver`; `None` for a light without extent or direction, and a receiver within a sphere.
+    pub fn new(light: &Light, receiver: Vec3) -> Option<Self> {
+        let (u, v, w, is_round, height) = match *light {
+            Light::Point { .. } | Light::Spot { .. } => return None,
+            Light::Directional { direction, angular_radius } => {
+                let w = (-direction).try_normalize()?;
+                let (u, v) = w.any_orthonormal_pair();
+                // A cone of a right angle or more has no circle: what is left out lies at the horizon.
+                let radius = angular_radius.min(1.5).tan();
+                (u * radius, v * radius, w, true, one_less_cos(angular_radius))
+            }
+            Light::Sphere { center, radius } => {
+                let w = center - receiver;
+                let distance = w.length();
+                if distance <= radius {
+                    return None;
+                }
+                let (u, v) = (w / distance).any_orthonormal_pair();
+                let sine = radius / distance;
+                let cosine = ((1.0 - sine) * (1.0 + sine)).sqrt();
+                let height = sine * sine / (1.0 + cosine);
+                let radius = sine / cosine * distance;
+                (u * radius, v * radius, w, true, height)
+            }
+            Light::Rect { center, half_u, half_v } => (half_u, half_v, center - receiver, false, 0.0),
+            Light::Disk { center, normal, radius } => {
+                let (u, v) = normal.try_normalize()?.any_orthonormal_pair();
+                (u * radius, v * radius, center - receiver, true, 0.0)
+            }
+        };
+        Some(Self { u, v, w, is_round, height })
     }
 }
 
