@@ -20,7 +20,7 @@ use scene_core::light::LightPoint;
 
 use crate::chosen::Chosen;
 use crate::coverage::is_left;
-use crate::lanes::{LANES, Lanes, load_three};
+use crate::lanes::{LANES, Lanes, Named, load_three};
 use crate::sites::{SiteVector, Sites, by_receivers};
 use crate::vectors::{Vec3x16, cross, dot, length, splat, sub};
 
@@ -51,7 +51,7 @@ struct FaceVector<S: Simd> {
 impl<S: Simd> FaceVector<S> {
     /// Whether a receiver lies behind a face as the light's centre sees it, a bit each: `receiver_plane::is_behind`.
     #[inline(always)]
-    fn is_before(&self, site: &SiteVector<S>) -> u64 {
+    fn is_behind(&self, site: &SiteVector<S>) -> u64 {
         let height = dot(self.normal, sub(site.world, self.world));
         (-(height * self.turn)).simd_gt(self.length * site.tolerance).to_bitmask()
     }
@@ -141,8 +141,8 @@ impl BlockFaces {
             if is_known {
                 (inside, outside) = self.sides(simd, vector, bounds, center);
             }
-            let (any, all) = self.before_any_and_all(simd, vector, sites, inside, valid & !outside);
             let asked = valid & !outside;
+            let (any, all) = self.behind_any_and_all(simd, vector, sites, (asked, inside));
             covers |= all & inside & asked != 0;
             kept = self.lanes.keep(vector, any & asked, kept);
         }
@@ -154,26 +154,22 @@ impl BlockFaces {
         }
     }
 
-    /// Which faces of a vector some of the receivers lie behind, and which all of them do, a bit each. Right for those that are `asked` in
-    /// so far as it matters: whether a face lies between is known of none or of all before whom it may, which are `inside`.
+    /// Which faces of a vector some of the receivers lie behind, and which all of them do, a bit each. Of those that are not `asked` nothing
+    /// is said, and whether all lie behind one of those that are not `inside`.
     #[inline(always)]
-    fn before_any_and_all<S: Simd>(
+    fn behind_any_and_all<S: Simd>(
         &self,
         simd: S,
         vector: usize,
         sites: &Sites,
-        inside: u64,
-        asked: u64,
+        (asked, inside): (u64, u64),
     ) -> (u64, u64) {
         let (mut any, mut all) = (0, u64::MAX);
         if by_receivers(sites.len(), self.lanes.len()) {
-            let mut left = asked;
-            while left != 0 {
-                let lane = left.trailing_zeros() as usize % LANES;
-                left &= left - 1;
+            for lane in Named(asked) {
                 let face = self.one(simd, vector * LANES + lane);
                 for of in 0..sites.vectors() {
-                    let (valid, behind) = (sites.valid(of), face.is_before(&sites.sixteen(simd, of)));
+                    let (valid, behind) = (sites.valid(of), face.is_behind(&sites.sixteen(simd, of)));
                     any |= u64::from(behind & valid != 0) << lane;
                     all &= !(u64::from(behind & valid != valid) << lane);
                     if (any & !(all & inside)) >> lane & 1 == 1 {
@@ -184,7 +180,7 @@ impl BlockFaces {
         } else {
             let face = self.sixteen(simd, vector);
             for receiver in 0..sites.len() {
-                let behind = face.is_before(&sites.one(simd, receiver));
+                let behind = face.is_behind(&sites.one(simd, receiver));
                 (any, all) = (any | behind, all & behind);
                 if any & asked == asked && all & inside & asked == 0 {
                     break;
@@ -202,13 +198,12 @@ impl BlockFaces {
                 let (site, valid) = (sites.sixteen(simd, of), sites.valid(of));
                 for index in 0..self.lanes.len() {
                     let face = self.one(simd, index);
-                    let mut before = face.is_before(&site) & valid;
+                    let mut before = face.is_behind(&site) & valid;
                     if before != 0 {
                         before &= face.meets_way(&site);
                     }
-                    while before != 0 {
-                        counts[of * LANES + before.trailing_zeros() as usize % LANES] += 1;
-                        before &= before - 1;
+                    for lane in Named(before) {
+                        counts[of * LANES + lane] += 1;
                     }
                 }
             }
@@ -217,7 +212,7 @@ impl BlockFaces {
                 let site = sites.one(simd, receiver);
                 for vector in 0..self.lanes.vectors() {
                     let face = self.sixteen(simd, vector);
-                    let before = face.is_before(&site) & self.lanes.valid(vector);
+                    let before = face.is_behind(&site) & self.lanes.valid(vector);
                     if before != 0 {
                         *count += (before & face.meets_way(&site)).count_ones() as i32;
                     }

@@ -7,7 +7,7 @@ use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
 use glam::Vec3;
 
 use crate::beam::Beam;
-use crate::lanes::{LANES, Lanes};
+use crate::lanes::{LANES, Lanes, Named};
 
 /// Things of N/3 corners each.
 #[derive(Debug)]
@@ -42,22 +42,19 @@ impl<const N: usize> Chosen<N> {
 
     /// Takes over the lanes of a vector that `bits` name.
     #[inline(always)]
-    fn take(&mut self, mut bits: u64, indices: &[u32; LANES], parts: &[[f32; LANES]; N]) {
-        let mut at = self.corners.len();
-        self.corners.resize(at + bits.count_ones() as usize);
+    fn take(&mut self, bits: u64, indices: &[u32; LANES], parts: &[[f32; LANES]; N]) {
+        let first = self.corners.len();
+        self.corners.resize(first + bits.count_ones() as usize);
         // Vectors are copied whole: there is always room for one more.
-        if self.indices.len() < at + 2 * LANES {
-            self.indices.resize(at + 2 * LANES, 0);
+        if self.indices.len() < first + 2 * LANES {
+            self.indices.resize(first + 2 * LANES, 0);
         }
-        while bits != 0 {
-            let lane = bits.trailing_zeros() as usize % LANES;
-            bits &= bits - 1;
+        for (at, lane) in (first..).zip(Named(bits)) {
             self.indices[at] = indices[lane];
             let (to, to_lane) = (self.corners.vector_mut(at / LANES), at % LANES);
             for (to, from) in to.iter_mut().zip(parts) {
                 to[to_lane] = from[lane];
             }
-            at += 1;
         }
     }
 

@@ -21,7 +21,7 @@
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x16, mask32x16};
 use glam::{Mat3, Vec2, Vec3};
 
-use crate::lanes::LANES;
+use crate::lanes::{LANES, Named};
 use crate::light_cones::share;
 use crate::sites::{SiteVector, Sites};
 use crate::tile_edges::{EdgeVector, TileEdges};
@@ -102,7 +102,7 @@ struct Crossing {
 #[derive(Debug, Default)]
 struct Over {
     crossings: Vec<Crossing>,
-    /// How many faces fewer than before the centre there may be at least.
+    /// By how many faces there may be fewer than before the centre, at most.
     fewer: f32,
 }
 
@@ -161,10 +161,7 @@ impl Counter {
             let Some(found) = Crossings::of(&site, &edge, edges.valid(vector), sites.is_parallel()) else {
                 continue;
             };
-            let mut there = found.there;
-            while there != 0 {
-                let lane = there.trailing_zeros() as usize % LANES;
-                there &= there - 1;
+            for lane in Named(found.there) {
                 over.push(found.lane(lane));
             }
         }
@@ -186,10 +183,7 @@ impl Counter {
         for index in 0..edges.len() {
             let edge = edges.one(simd, index);
             let Some(found) = Crossings::of(&site, &edge, valid, sites.is_parallel()) else { continue };
-            let mut there = found.there;
-            while there != 0 {
-                let lane = there.trailing_zeros() as usize % LANES;
-                there &= there - 1;
+            for lane in Named(found.there) {
                 self.over[lane].push(found.lane(lane));
             }
         }

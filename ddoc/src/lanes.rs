@@ -9,6 +9,24 @@ use crate::vectors::Vec3x16;
 /// Lanes of a vector.
 pub(crate) const LANES: usize = 16;
 
+/// The lanes that bits name, one after the other.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Named(pub(crate) u64);
+
+impl Iterator for Named {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        if self.0 == 0 {
+            return None;
+        }
+        let lane = self.0.trailing_zeros() as usize % LANES;
+        self.0 &= self.0 - 1;
+        Some(lane)
+    }
+}
+
 /// Things of N numbers each. Lanes after the last thing hold anything: [`valid`](Self::valid) tells them apart.
 #[derive(Debug)]
 pub(crate) struct Lanes<const N: usize> {
@@ -91,13 +109,11 @@ impl<const N: usize> Lanes<N> {
 
     /// Moves the lanes that `bits` name, of a vector, down to where `kept` things are already, and says how many are kept then.
     #[inline(always)]
-    pub(crate) fn keep(&mut self, vector: usize, mut bits: u64, mut kept: usize) -> usize {
+    pub(crate) fn keep(&mut self, vector: usize, bits: u64, mut kept: usize) -> usize {
         if kept == vector * LANES && bits == self.valid(vector) {
             return kept + bits.count_ones() as usize;
         }
-        while bits != 0 {
-            let lane = bits.trailing_zeros() as usize % LANES;
-            bits &= bits - 1;
+        for lane in Named(bits) {
             let (to, to_lane) = (kept / LANES, kept % LANES);
             for part in 0..N {
                 self.vectors[to][part][to_lane] = self.vectors[vector][part][lane];

@@ -10,7 +10,7 @@ use gnomon_shadow_map::light_maps::Receiver;
 use scene_core::Light;
 
 use crate::coverage::Site;
-use crate::lanes::{LANES, Lanes, load_three};
+use crate::lanes::{LANES, Lanes, Named, load_three};
 use crate::light_cones::{LightCones, coarse};
 use crate::vectors::{Vec3x16, dot, splat};
 
@@ -93,10 +93,7 @@ impl Sites {
             parts[ORIENTATION] = cones.right_handed.select(-one, one).to_array();
             parts[HEIGHT] = cones.height.to_array().map(coarse);
             parts[HAS_CONE] = cones.there.select(one, nothing).to_array();
-            let mut without = valid & !cones.there.to_bitmask();
-            while without != 0 {
-                let lane = without.trailing_zeros() as usize % LANES;
-                without &= without - 1;
+            for lane in Named(valid & !cones.there.to_bitmask()) {
                 let at = |part: usize| Vec3::from_array([0, 1, 2].map(|axis| parts[part + axis][lane]));
                 // b and a are two directions across the way to the light's centre, t is along it.
                 let (to_center, _) = light.center().ray_from(at(WORLD));
