@@ -3,8 +3,9 @@
 //! | rule | why |
 //! | --- | --- |
 //! | no implicit derivatives | shadow lookups jump at every edge: derivatives there choose wrong levels |
-//! | at most 256 invocations a workgroup, 8 storage buffers a stage, bind groups 0 to 3 | WebGPU's defaults |
+//! | at most 256 invocations a workgroup and 16,384 bytes that they share, 8 storage buffers a stage, bind groups 0 to 3 | WebGPU's defaults |
 
+use naga::proc::Layouter;
 use naga::{AddressSpace, Expression, Function, Module, SampleLevel, Span};
 
 /// Rules that `module` breaks, each with where.
@@ -29,10 +30,25 @@ pub(super) fn broken(module: &Module) -> Vec<(Option<Span>, String)> {
                 .push((Some(module.global_variables.get_span(handle)), "bind groups are 0 to 3".to_owned()));
         }
     }
+    let shared = shared_bytes(module);
+    if shared > 16_384 {
+        broken.push((None, format!("{shared} bytes shared by a workgroup, at most 16384")));
+    }
     if storage > 8 {
         broken.push((None, format!("{storage} storage buffers, at most 8")));
     }
     broken
+}
+
+/// Bytes that a workgroup shares, as WebGPU counts them: each variable in pieces of 16.
+fn shared_bytes(module: &Module) -> u32 {
+    let mut layouts = Layouter::default();
+    if layouts.update(module.to_ctx()).is_err() {
+        return 0;
+    }
+    let variables = module.global_variables.iter().map(|(_, variable)| variable);
+    let shared = variables.filter(|variable| variable.space == AddressSpace::WorkGroup);
+    shared.map(|variable| layouts[variable.ty].size.next_multiple_of(16)).sum()
 }
 
 fn implicit_derivatives(function: &Function, broken: &mut Vec<(Option<Span>, String)>) {
@@ -103,5 +119,9 @@ mod tests {
         assert!(rules(&buffers(8, 3)).is_empty());
         assert_eq!(rules(&buffers(9, 0)).len(), 1);
         assert_eq!(rules(&buffers(1, 4)).len(), 1);
+        let shared =
+            |floats: u32| format!("var<workgroup> one: u32;\nvar<workgroup> all: array<f32, {floats}>;\n");
+        assert!(rules(&shared(4092)).is_empty());
+        assert_eq!(rules(&shared(4093)).len(), 1);
     }
 }
