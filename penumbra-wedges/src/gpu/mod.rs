@@ -8,6 +8,7 @@
 //! | `shade.blocks` | edges against blocks of 64 × 64 pixels | `cpu`'s strips |
 //! | `shade.masks` | where there are masks, which tiles they may hide the light from | [`wedges`](crate::wedges) |
 //! | `shade.wedges` | the rest against tiles of 8 × 8 pixels, and what is left drawn for each pixel | `cpu`, [`exact`](crate::exact), [`coverage`](crate::coverage), [`interpolated`](crate::interpolated) |
+//! | `shade.asked` | for `exact`: pixels that this has left, in tiles with too many edges or too many of whose faces the light lies on both sides | [`exact`](crate::exact) |
 //! | `shade.rays` | one exact ray for each pixel that was counted | [`Bvh`](scene_core::bvh::Bvh) |
 //! | `shade.traced` | rays to all samples of pixels that were not | [`Exact::traced`](crate::exact::Exact::traced) |
 //! | `shade.write` | V | |
@@ -19,6 +20,11 @@
 //! gathers the edges of all wedges it may lie in ([`shaft`](shaders): the planes that bound a wedge, asked from the receivers' end, which
 //! needs nothing to be kept for an edge; the wedges of `interpolated`, which are wider, by their own planes), and sums over them in
 //! registers, in integers: no order of edges changes a sum.
+//!
+//! `exact` counts four pixels of a tile at a time, a team of sixteen threads each. The faces that edges bound are the same for all pixels
+//! of a tile, but for the few that have a pixel and the light on both sides of their plane: what is the same is found once, by f32 with a
+//! bound, and the rest is asked from each pixel before it is counted, exactly. So the loop over pixels and edges draws and counts, and does
+//! nothing else. Tiles that have no room for what pixels ask are left to `shade.asked`, whose loop asks all of it.
 //!
 //! # A limit of one driver
 //! Mesa's software Vulkan ends all loops of an invocation after 65,535 rounds together. A tile whose block has millions of edges, or more
@@ -47,7 +53,7 @@ use crate::cpu::{EDGES_A_RAY, TILE};
 use crate::error::WedgeError;
 use crate::params::{Variant, WedgeParams};
 use layout::WedgesUniform;
-use passes::Passes;
+use passes::{Pass, Passes};
 use tables::{Tables, TablesError};
 
 /// Bytes that the lists of edges of all blocks may take together. A block that has no room for its edges tells its
@@ -290,9 +296,13 @@ impl PenumbraWedgesOnGpu {
             pass.pass.record(recorder, "shade.masks", &groups, [columns, rows, 1]);
         }
         let own = [&shared[..], of_edges.as_slice(), std::slice::from_ref(&pixels)].concat();
-        let own = passes.count.group.get(device, &own);
-        let groups = [Some(&own), triangles, None, receivers];
-        passes.count.pass.record(recorder, "shade.wedges", &groups, [columns, rows, 1]);
+        let counts =
+            [("shade.wedges", Some(&mut passes.count)), ("shade.asked", passes.count_asked.as_mut())];
+        for (stage, pass) in counts {
+            let Some(Pass { pass, group }) = pass else { continue };
+            let groups = [Some(&group.get(device, &own)), triangles, None, receivers];
+            pass.record(recorder, stage, &groups, [columns, rows, 1]);
+        }
 
         let shared = [settings.clone(), nodes, leaves];
         let own = if exact { vec![pixels.clone()] } else { vec![facing, pixels.clone()] };

@@ -33,6 +33,8 @@ pub(super) struct Passes {
     /// Of `exact`.
     pub(super) find_masked: Option<Pass>,
     pub(super) count: Pass,
+    /// Of `exact`.
+    pub(super) count_asked: Option<Pass>,
     pub(super) ask: Pass,
     pub(super) trace: Pass,
     pub(super) write_group: HeldGroup,
@@ -91,10 +93,10 @@ impl Passes {
         };
         let find_masked =
             exact.then(|| pass("wedges masks", shaders::MASKS, "find_masked", lit, &[READ, READ, WRITE]));
+        let count_exact = |label, wgsl| pass(label, wgsl, "count", lit, &[READ, READ, READ, READ, WRITE]);
+        let count_asked = exact.then(|| count_exact("wedges asked", shaders::EXACT_ASKED));
         let count = match variant {
-            Variant::Exact => {
-                pass("wedges exact", shaders::EXACT, "count", lit, &[READ, READ, READ, READ, WRITE])
-            }
+            Variant::Exact => count_exact("wedges exact", shaders::EXACT),
             Variant::Coverage => {
                 pass("wedges coverage", shaders::COVERAGE, "add", lit, &[READ, READ, READ, WRITE])
             }
@@ -160,6 +162,7 @@ impl Passes {
             list_edges,
             find_masked,
             count,
+            count_asked,
             ask,
             trace,
             write_group,
