@@ -20,7 +20,7 @@ use scene_core::light::LightPoint;
 
 use crate::chosen::Chosen;
 use crate::coverage::is_left;
-use crate::lanes::{LANES, Lanes, Named, load_three};
+use crate::lanes::{LANES, Lanes, Named, Source};
 use crate::sites::{SiteVector, Sites, by_receivers};
 use crate::vectors::{Vec3x16, cross, dot, length, splat, sub};
 
@@ -49,6 +49,17 @@ struct FaceVector<S: Simd> {
 }
 
 impl<S: Simd> FaceVector<S> {
+    #[inline(always)]
+    fn of(numbers: impl Source<S>) -> Self {
+        Self {
+            corners: [numbers.three(0), numbers.three(3), numbers.three(6)],
+            world: numbers.three(WORLD),
+            normal: numbers.three(NORMAL),
+            length: numbers.number(LENGTH),
+            turn: numbers.number(TURN),
+        }
+    }
+
     /// Whether a receiver lies behind a face as the light's centre sees it, a bit each: `receiver_plane::is_behind`.
     #[inline(always)]
     fn is_behind(&self, site: &SiteVector<S>) -> u64 {
@@ -98,9 +109,8 @@ impl BlockFaces {
         self.lanes.resize(corners.len());
         let (nothing, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
         for vector in 0..corners.vectors() {
-            let parts = corners.vector(vector);
-            let (a, b) = (load_three(simd, parts, 0), load_three(simd, parts, 3));
-            let c = load_three(simd, parts, 6);
+            let numbers = corners.sixteen(simd, vector);
+            let [a, b, c] = [numbers.three(0), numbers.three(3), numbers.three(6)];
             let normal = cross(sub(b, a), sub(c, a));
             let length = length(normal);
             let way = match center {
@@ -224,31 +234,13 @@ impl BlockFaces {
     /// A vector of faces.
     #[inline(always)]
     fn sixteen<S: Simd>(&self, simd: S, vector: usize) -> FaceVector<S> {
-        let parts = self.lanes.vector(vector);
-        FaceVector {
-            corners: [load_three(simd, parts, 0), load_three(simd, parts, 3), load_three(simd, parts, 6)],
-            world: load_three(simd, parts, WORLD),
-            normal: load_three(simd, parts, NORMAL),
-            length: f32x16::load_array_ref(simd, &parts[LENGTH]),
-            turn: f32x16::load_array_ref(simd, &parts[TURN]),
-        }
+        FaceVector::of(self.lanes.sixteen(simd, vector))
     }
 
     /// One face, sixteen times.
     #[inline(always)]
     fn one<S: Simd>(&self, simd: S, index: usize) -> FaceVector<S> {
-        let lanes = &self.lanes;
-        FaceVector {
-            corners: [
-                splat(simd, lanes.three(index, 0)),
-                splat(simd, lanes.three(index, 3)),
-                splat(simd, lanes.three(index, 6)),
-            ],
-            world: splat(simd, lanes.three(index, WORLD)),
-            normal: splat(simd, lanes.three(index, NORMAL)),
-            length: f32x16::splat(simd, lanes.at(index, LENGTH)),
-            turn: f32x16::splat(simd, lanes.at(index, TURN)),
-        }
+        FaceVector::of(self.lanes.one(simd, index))
     }
 
     /// Which faces have all of a box within the planes through their edges and the light's centre, or within those opposite;
@@ -258,9 +250,9 @@ impl BlockFaces {
         let (middle, half) = (bounds.center(), 0.5 * bounds.size());
         let (mut positive, mut negative) = ([0; 3], [0; 3]);
         for side in 0..3 {
-            let parts = self.lanes.vector(vector);
-            let a: Vec3x16<S> = load_three(simd, parts, 3 * side);
-            let along = sub(load_three(simd, parts, 3 * ((side + 1) % 3)), a);
+            let numbers = self.lanes.sixteen(simd, vector);
+            let a: Vec3x16<S> = numbers.three(3 * side);
+            let along = sub(numbers.three(3 * ((side + 1) % 3)), a);
             let way = match center {
                 LightPoint::At(place) => sub(splat(simd, place), a),
                 LightPoint::Towards(way) => splat(simd, way),

@@ -95,6 +95,18 @@ impl<const N: usize> Lanes<N> {
         &mut self.vectors[vector]
     }
 
+    /// The things of a vector.
+    #[inline(always)]
+    pub(crate) fn sixteen<S: Simd>(&self, simd: S, vector: usize) -> Sixteen<'_, S, N> {
+        Sixteen { simd, parts: &self.vectors[vector] }
+    }
+
+    /// One thing.
+    #[inline(always)]
+    pub(crate) fn one<S: Simd>(&self, simd: S, thing: usize) -> One<'_, S, N> {
+        One { simd, parts: &self.vectors[thing / LANES], lane: thing % LANES }
+    }
+
     /// A number of one thing.
     #[inline(always)]
     pub(crate) fn at(&self, thing: usize, part: usize) -> f32 {
@@ -124,17 +136,45 @@ impl<const N: usize> Lanes<N> {
     }
 }
 
-/// Three numbers of a vector from `part` on.
-#[inline(always)]
-pub(crate) fn load_three<S: Simd, const N: usize>(
+/// Where the numbers of a vector come from. What is made of them is the same code for [`Sixteen`] things and for [`One`].
+pub(crate) trait Source<S: Simd>: Copy {
+    /// One number.
+    fn number(self, part: usize) -> f32x16<S>;
+
+    /// Three from `part` on.
+    #[inline(always)]
+    fn three(self, part: usize) -> Vec3x16<S> {
+        [self.number(part), self.number(part + 1), self.number(part + 2)]
+    }
+}
+
+/// Sixteen things, a lane each.
+#[derive(Clone, Copy)]
+pub(crate) struct Sixteen<'a, S, const N: usize> {
     simd: S,
-    vector: &[[f32; LANES]; N],
-    part: usize,
-) -> Vec3x16<S> {
-    // Spelled out: a closure would be a call of its own.
-    let (x, y) =
-        (f32x16::load_array_ref(simd, &vector[part]), f32x16::load_array_ref(simd, &vector[part + 1]));
-    [x, y, f32x16::load_array_ref(simd, &vector[part + 2])]
+    parts: &'a [[f32; LANES]; N],
+}
+
+impl<S: Simd, const N: usize> Source<S> for Sixteen<'_, S, N> {
+    #[inline(always)]
+    fn number(self, part: usize) -> f32x16<S> {
+        f32x16::load_array_ref(self.simd, &self.parts[part])
+    }
+}
+
+/// One thing in all lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct One<'a, S, const N: usize> {
+    simd: S,
+    parts: &'a [[f32; LANES]; N],
+    lane: usize,
+}
+
+impl<S: Simd, const N: usize> Source<S> for One<'_, S, N> {
+    #[inline(always)]
+    fn number(self, part: usize) -> f32x16<S> {
+        f32x16::splat(self.simd, self.parts[part][self.lane % LANES])
+    }
 }
 
 #[cfg(test)]

@@ -10,9 +10,9 @@ use gnomon_shadow_map::light_maps::Receiver;
 use scene_core::Light;
 
 use crate::coverage::Site;
-use crate::lanes::{LANES, Lanes, Named, load_three};
+use crate::lanes::{LANES, Lanes, Named, Source};
 use crate::light_cones::{LightCones, coarse};
-use crate::vectors::{Vec3x16, dot, splat};
+use crate::vectors::{Vec3x16, dot};
 
 /// Numbers a receiver: from the origin, in world space, its normal, the tolerance; three rows, the orientation, the height, and 1
 /// if it has a cone.
@@ -53,6 +53,18 @@ pub(crate) struct SiteVector<S: Simd> {
 }
 
 impl<S: Simd> SiteVector<S> {
+    #[inline(always)]
+    fn of(numbers: impl Source<S>) -> Self {
+        Self {
+            point: numbers.three(0),
+            world: numbers.three(WORLD),
+            normal: numbers.three(NORMAL),
+            tolerance: numbers.number(TOLERANCE),
+            orientation: numbers.number(ORIENTATION),
+            rows: [numbers.three(ROWS), numbers.three(ROWS + 3), numbers.three(ROWS + 6)],
+        }
+    }
+
     /// (a, b, t) of points, counted from the receivers.
     #[inline(always)]
     pub(crate) fn locate(&self, from_receiver: Vec3x16<S>) -> Vec3x16<S> {
@@ -85,8 +97,8 @@ impl Sites {
         let (one, nothing) = (f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
         for vector in 0..self.lanes.vectors() {
             let valid = self.lanes.valid(vector);
+            let cones = LightCones::new(simd, light, self.lanes.sixteen(simd, vector).three(WORLD));
             let parts = self.lanes.vector_mut(vector);
-            let cones = LightCones::new(simd, light, load_three(simd, parts, WORLD));
             for (part, row) in parts[ROWS..].iter_mut().zip(cones.rows.as_flattened()) {
                 *part = row.to_array();
             }
@@ -136,36 +148,13 @@ impl Sites {
     /// A vector of receivers.
     #[inline(always)]
     pub(crate) fn sixteen<S: Simd>(&self, simd: S, vector: usize) -> SiteVector<S> {
-        let parts = self.lanes.vector(vector);
-        SiteVector {
-            point: load_three(simd, parts, 0),
-            world: load_three(simd, parts, WORLD),
-            normal: load_three(simd, parts, NORMAL),
-            tolerance: f32x16::load_array_ref(simd, &parts[TOLERANCE]),
-            orientation: f32x16::load_array_ref(simd, &parts[ORIENTATION]),
-            rows: [
-                load_three(simd, parts, ROWS),
-                load_three(simd, parts, ROWS + 3),
-                load_three(simd, parts, ROWS + 6),
-            ],
-        }
+        SiteVector::of(self.lanes.sixteen(simd, vector))
     }
 
     /// One receiver, sixteen times.
     #[inline(always)]
     pub(crate) fn one<S: Simd>(&self, simd: S, index: usize) -> SiteVector<S> {
-        SiteVector {
-            point: splat(simd, self.lanes.three(index, 0)),
-            world: splat(simd, self.lanes.three(index, WORLD)),
-            normal: splat(simd, self.lanes.three(index, NORMAL)),
-            tolerance: f32x16::splat(simd, self.lanes.at(index, TOLERANCE)),
-            orientation: f32x16::splat(simd, self.lanes.at(index, ORIENTATION)),
-            rows: [
-                splat(simd, self.lanes.three(index, ROWS)),
-                splat(simd, self.lanes.three(index, ROWS + 3)),
-                splat(simd, self.lanes.three(index, ROWS + 6)),
-            ],
-        }
+        SiteVector::of(self.lanes.one(simd, index))
     }
 
     /// One receiver.

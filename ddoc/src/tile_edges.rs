@@ -3,10 +3,10 @@
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x16};
 use glam::Vec3;
 
-use crate::lanes::{LANES, Lanes, load_three};
+use crate::lanes::{LANES, Lanes, Source};
 use crate::silhouettes::Edge;
 use crate::sites::{SiteVector, Sites, by_receivers};
-use crate::vectors::{Vec3x16, dot, splat, sub};
+use crate::vectors::{Vec3x16, dot, sub};
 
 /// Numbers an edge: a, b, the two planes, the two signs; the point seen past the edge.
 const PARTS: usize = 19;
@@ -30,6 +30,21 @@ pub(crate) struct EdgeVector<S: Simd> {
 }
 
 impl<S: Simd> EdgeVector<S> {
+    #[inline(always)]
+    fn of(numbers: impl Source<S>, has_far: bool) -> Self {
+        let [first, second] = PLANES;
+        Self {
+            a: numbers.three(0),
+            b: numbers.three(3),
+            planes: [
+                (numbers.three(first), numbers.number(first + 3)),
+                (numbers.three(second), numbers.number(second + 3)),
+            ],
+            signs: [numbers.number(SIGNS), numbers.number(SIGNS + 1)],
+            far: if has_far { Some(numbers.three(FAR)) } else { None },
+        }
+    }
+
     /// m(e) as seen from a point.
     #[inline(always)]
     pub(crate) fn multiplicity(&self, point: Vec3x16<S>) -> f32x16<S> {
@@ -124,40 +139,13 @@ impl TileEdges {
     /// A vector of edges.
     #[inline(always)]
     pub(crate) fn sixteen<S: Simd>(&self, simd: S, vector: usize) -> EdgeVector<S> {
-        let parts = self.lanes.vector(vector);
-        let (first, second) = (&parts[PLANES[0] + 3], &parts[PLANES[1] + 3]);
-        EdgeVector {
-            a: load_three(simd, parts, 0),
-            b: load_three(simd, parts, 3),
-            planes: [
-                (load_three(simd, parts, PLANES[0]), f32x16::load_array_ref(simd, first)),
-                (load_three(simd, parts, PLANES[1]), f32x16::load_array_ref(simd, second)),
-            ],
-            signs: [
-                f32x16::load_array_ref(simd, &parts[SIGNS]),
-                f32x16::load_array_ref(simd, &parts[SIGNS + 1]),
-            ],
-            far: if self.has_far { Some(load_three(simd, parts, FAR)) } else { None },
-        }
+        EdgeVector::of(self.lanes.sixteen(simd, vector), self.has_far)
     }
 
     /// One edge, sixteen times.
     #[inline(always)]
     pub(crate) fn one<S: Simd>(&self, simd: S, index: usize) -> EdgeVector<S> {
-        let (first, second) = (self.lanes.at(index, PLANES[0] + 3), self.lanes.at(index, PLANES[1] + 3));
-        EdgeVector {
-            a: splat(simd, self.lanes.three(index, 0)),
-            b: splat(simd, self.lanes.three(index, 3)),
-            planes: [
-                (splat(simd, self.lanes.three(index, PLANES[0])), f32x16::splat(simd, first)),
-                (splat(simd, self.lanes.three(index, PLANES[1])), f32x16::splat(simd, second)),
-            ],
-            signs: [
-                f32x16::splat(simd, self.lanes.at(index, SIGNS)),
-                f32x16::splat(simd, self.lanes.at(index, SIGNS + 1)),
-            ],
-            far: if self.has_far { Some(splat(simd, self.lanes.three(index, FAR))) } else { None },
-        }
+        EdgeVector::of(self.lanes.one(simd, index), self.has_far)
     }
 
     /// The ends of an edge.
