@@ -22,6 +22,9 @@ use crate::params::Variant;
 use crate::silhouettes::Edge;
 use crate::tiles::{TileReceivers, Tiles};
 
+/// Edges and faces that take as long to take over as a receiver does to answer.
+const TAKEN_A_RECEIVER: usize = 4;
+
 /// `prepare.map`: every face of `casters` over every texel's centre, a view each.
 pub fn draw_layers(
     scene: &Scene,
@@ -101,11 +104,21 @@ fn penumbra(
     report: &mut Report,
     site: &(impl Fn(usize) -> Result<Receiver, f32> + Sync),
 ) {
-    // Edges are looked up once for many receivers where each block of them then chooses its own; not for so many that blocks
-    // would be cut below the finest tiles all over, which have their edges listed.
+    // Edges are looked up once for many receivers where each block of them then chooses its own.
     let is_chosen = prepared.skip && prepared.variant != Variant::Paper;
     let level = if is_chosen { maps.first().map_or(0, |map| (map.grid().levels() - 1).min(1)) } else { 0 };
-    let (sorted, ranges) = tiles.sorted(level, 2 * FEW_RECEIVERS);
+    // Not for so many that blocks would be cut below the finest tiles all over, which have their edges listed; but what lies over all of these
+    // alike each of them takes over for itself.
+    let is_cut = |view: usize, tile: u32, receivers: usize, finest: usize| {
+        let shared = || {
+            let [splats, faces] = [&maps[view], prepared.faces[view].lists()];
+            splats.over_all_of(level, tile) + faces.over_all_of(level, tile)
+        };
+        level > 0
+            && receivers > 2 * FEW_RECEIVERS * finest
+            && shared() * finest <= TAKEN_A_RECEIVER * receivers
+    };
+    let (sorted, ranges) = tiles.sorted(level, is_cut);
     let simd_level = Level::new();
     let without_edge = AtomicU64::new(0);
     let parts: Vec<Vec<f32>> = ranges

@@ -288,6 +288,19 @@ impl TileLists {
         })
     }
 
+    /// How much lies over all of a tile of the grid of `level` alike: what that grid and those above list for it.
+    pub fn over_all_of(&self, level: u32, tile: u32) -> usize {
+        let side = self.grid.tiles_at(level);
+        let (column, row) = (tile % side, tile / side);
+        let held = (level..self.grid.levels).map(|above| {
+            let shift = RATIO * (above - level);
+            let at = (row >> shift) * self.grid.tiles_at(above) + (column >> shift);
+            let at = self.grid.first_of(above) + at as usize;
+            (self.first[at + 1] - self.first[at]) as usize
+        });
+        held.sum()
+    }
+
     /// What lies over any part of a tile of the grid of `level`; some of it more than once.
     pub fn of_all_within(&self, level: u32, tile: u32) -> impl Iterator<Item = u32> + '_ {
         let side = self.grid.tiles_at(level);
@@ -399,6 +412,9 @@ mod tests {
                 let fine = (0..64 * 64).filter(|fine| {
                     (fine % 64) >> shift == tile % side && (fine / 64) >> shift == tile / side
                 });
+                let alike = Some(lists.over_all_of(level, tile));
+                let least = fine.clone().map(|fine| lists.of(fine).count()).min();
+                assert!(alike <= least && (level > 0 || alike == least), "{tile} of {level}");
                 let mut expected: Vec<u32> = fine.flat_map(|fine| lists.of(fine)).collect();
                 let mut found: Vec<u32> = lists.of_all_within(level, tile).collect();
                 for all in [&mut expected, &mut found] {

@@ -84,8 +84,13 @@ impl Tiles {
     }
 
     /// The receivers that have a tile, sorted by tiles of the grid of `level`, within one by its finest tiles, and in those in their
-    /// own order. Where the finest hold more than `most` each, on average, they are tiles of their own.
-    pub fn sorted(&self, level: u32, most: usize) -> (Vec<u32>, Vec<TileReceivers>) {
+    /// own order. `is_cut` says of a view's tile, how many receivers it holds and how many of the finest, whether these are tiles of their
+    /// own.
+    pub fn sorted(
+        &self,
+        level: u32,
+        is_cut: impl Fn(usize, u32, usize, usize) -> bool,
+    ) -> (Vec<u32>, Vec<TileReceivers>) {
         let (views, tiles) = (self.farthest.len(), self.grid.tiles_at(level) * self.grid.tiles_at(level));
         let (order, starts) = self.grid.finest_by(level);
         // Of each of the finest tiles its place in this order.
@@ -110,7 +115,7 @@ impl Tiles {
             for tile in 0..tiles {
                 let [from, to] = [0, 1].map(|end| starts[(tile + end) as usize]);
                 let held = range(base + from, base + to);
-                if held.len() > most * (to - from) as usize {
+                if !held.is_empty() && is_cut(view, tile, held.len(), (to - from) as usize) {
                     let finest = (from..to).map(|at| TileReceivers {
                         view,
                         level: 0,
@@ -150,7 +155,7 @@ mod tests {
         let of: Vec<u32> =
             (0..per_view).chain((0..20).flat_map(|_| last_row.clone())).chain([NONE]).collect();
         let tiles = Tiles { of, farthest: vec![Farthest::new(grid)], per_view, grid };
-        let (sorted, ranges) = tiles.sorted(1, 3);
+        let (sorted, ranges) = tiles.sorted(1, |_, _, receivers, finest| receivers > 3 * finest);
         let mut found = sorted.clone();
         found.sort_unstable();
         assert!(found.into_iter().eq(0..tiles.of.len() as u32 - 1));
